@@ -1,0 +1,89 @@
+# The functions with which every folder declares its target.
+
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+
+# Warnings, sanitizers and debug checks that every target of ours is built with.
+add_library(trigmesh_compile_options INTERFACE)
+target_include_directories(trigmesh_compile_options INTERFACE "${CMAKE_SOURCE_DIR}" "${CMAKE_BINARY_DIR}/generated")
+target_compile_options(trigmesh_compile_options INTERFACE
+  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion -Wold-style-cast -Woverloaded-virtual
+  -Wnon-virtual-dtor -Wcast-align -Wformat=2 -Wimplicit-fallthrough -Wdouble-promotion -Wundef -Wextra-semi
+  -Wmissing-declarations
+  $<$<CXX_COMPILER_ID:GNU>:-Wduplicated-cond -Wlogical-op>
+  $<$<CXX_COMPILER_ID:Clang>:-Wthread-safety>
+  $<$<BOOL:${TRIGMESH_WERROR}>:-Werror>
+  # Multiplications are never fused behind our back: the same source gives the same bits on every x86 build.
+  -ffp-contract=off)
+target_compile_definitions(trigmesh_compile_options INTERFACE
+  $<$<CONFIG:Debug>:EIGEN_INITIALIZE_MATRICES_BY_NAN _GLIBCXX_ASSERTIONS>)
+if(TRIGMESH_SANITIZE)
+  target_compile_options(trigmesh_compile_options INTERFACE -fsanitize=${TRIGMESH_SANITIZE} -fno-omit-frame-pointer
+                                                            -fno-sanitize-recover=all)
+  target_link_options(trigmesh_compile_options INTERFACE -fsanitize=${TRIGMESH_SANITIZE})
+endif()
+
+# trigmesh_add_library(NAME sfm_camera SOURCES .. HEADERS .. PUBLIC .. PRIVATE ..)
+# One folder, one target trigmesh_<NAME>. A folder of headers only becomes an INTERFACE library.
+function(trigmesh_add_library)
+  cmake_parse_arguments(ARG "" "NAME" "SOURCES;HEADERS;PUBLIC;PRIVATE" ${ARGN})
+  set(target trigmesh_${ARG_NAME})
+  if(ARG_SOURCES)
+    add_library(${target} STATIC ${ARG_SOURCES})
+    target_sources(${target} PUBLIC FILE_SET HEADERS BASE_DIRS "${CMAKE_SOURCE_DIR}" FILES ${ARG_HEADERS})
+    target_link_libraries(${target} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE} trigmesh_compile_options)
+    target_include_directories(${target} PUBLIC "${CMAKE_SOURCE_DIR}")
+  else()
+    add_library(${target} INTERFACE)
+    target_sources(${target} INTERFACE FILE_SET HEADERS BASE_DIRS "${CMAKE_SOURCE_DIR}" FILES ${ARG_HEADERS})
+    target_link_libraries(${target} INTERFACE ${ARG_PUBLIC})
+    target_include_directories(${target} INTERFACE "${CMAKE_SOURCE_DIR}")
+  endif()
+endfunction()
+
+# trigmesh_add_test(NAME unit_sfm_camera SOURCES .. LIBRARIES .. LABEL unit [TIMEOUT 60])
+# A GoogleTest program; every TEST in it becomes a ctest entry with the label and time-out.
+function(trigmesh_add_test)
+  cmake_parse_arguments(ARG "" "NAME;LABEL;TIMEOUT" "SOURCES;LIBRARIES" ${ARGN})
+  if(NOT TRIGMESH_BUILD_TESTS)
+    return()
+  endif()
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 60)
+  endif()
+  add_executable(${ARG_NAME} ${ARG_SOURCES})
+  target_link_libraries(${ARG_NAME} PRIVATE ${ARG_LIBRARIES} GTest::gmock GTest::gtest_main trigmesh_compile_options)
+  gtest_discover_tests(${ARG_NAME} DISCOVERY_MODE PRE_TEST
+                       PROPERTIES LABELS "${ARG_LABEL}" TIMEOUT ${ARG_TIMEOUT})
+endfunction()
+
+# trigmesh_add_benchmark(NAME bench_matching SOURCES .. LIBRARIES ..)
+function(trigmesh_add_benchmark)
+  cmake_parse_arguments(ARG "" "NAME" "SOURCES;LIBRARIES" ${ARGN})
+  if(NOT TRIGMESH_BUILD_BENCH)
+    return()
+  endif()
+  add_executable(${ARG_NAME} ${ARG_SOURCES})
+  target_link_libraries(${ARG_NAME} PRIVATE ${ARG_LIBRARIES} benchmark::benchmark_main trigmesh_compile_options)
+endfunction()
+
+# trigmesh_add_fuzzer(NAME fuzz_colmap_text SOURCES .. LIBRARIES .. CORPUS dir)
+# A libFuzzer program; ctest runs it for TRIGMESH_FUZZ_SECONDS on its committed corpus (label fuzz).
+set(TRIGMESH_FUZZ_SECONDS 60 CACHE STRING "Seconds that each fuzz target runs under ctest")
+function(trigmesh_add_fuzzer)
+  cmake_parse_arguments(ARG "" "NAME;CORPUS" "SOURCES;LIBRARIES" ${ARGN})
+  if(NOT TRIGMESH_BUILD_FUZZ)
+    return()
+  endif()
+  add_executable(${ARG_NAME} ${ARG_SOURCES})
+  target_link_libraries(${ARG_NAME} PRIVATE ${ARG_LIBRARIES} trigmesh_compile_options)
+  target_link_options(${ARG_NAME} PRIVATE -fsanitize=fuzzer)
+  set(work "${CMAKE_CURRENT_BINARY_DIR}/${ARG_NAME}_corpus")
+  file(MAKE_DIRECTORY "${work}")
+  math(EXPR limit "${TRIGMESH_FUZZ_SECONDS} + 120")
+  add_test(NAME ${ARG_NAME} COMMAND ${ARG_NAME} -max_total_time=${TRIGMESH_FUZZ_SECONDS} -timeout=10
+                                    -rss_limit_mb=2048 -print_final_stats=1 "${work}" "${ARG_CORPUS}")
+  set_tests_properties(${ARG_NAME} PROPERTIES LABELS fuzz TIMEOUT ${limit})
+endfunction()
