@@ -1,0 +1,166 @@
+#include "firmware/pipeline/report_json.hpp"
+
+#include <cmath>
+
+#include <nlohmann/json.hpp>
+
+namespace trigmesh {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int kSchema = 1;
+constexpr int kIndent = 2;
+constexpr int kPixelDigits = 4;
+constexpr int kAngleDigits = 3;
+constexpr int kRatioDigits = 3;
+constexpr int kDistortionDigits = 8;
+
+/// Rounded to `digits` behind the point; null when not finite.
+Json rounded(double value, int digits) {
+  if (!std::isfinite(value)) {
+    return nullptr;
+  }
+  const double scale = std::pow(10.0, digits);
+  const double result = std::round(value * scale) / scale;
+  return result == 0.0 ? 0.0 : result;  // no negative zero
+}
+
+Json to_json(const ComponentReport& component) {
+  return {
+      {"registered_images", component.registered_images},
+      {"points", component.points},
+      {"observations", component.observations},
+      {"mean_track_length", rounded(component.mean_track_length, kRatioDigits)},
+      {"reprojection_rmse_px", rounded(component.rmse_px, kPixelDigits)},
+      {"reprojection_median_px", rounded(component.median_error_px, kPixelDigits)},
+      {"reprojection_mean_px", rounded(component.mean_error_px, kPixelDigits)},
+  };
+}
+
+Json to_json(const Histogram& histogram) {
+  return {
+      {"start", histogram.start}, {"bin_width", histogram.bin_width}, {"counts", histogram.counts}};
+}
+
+Json distortion_to_json(const Camera& camera) {
+  static constexpr std::array<const char*, 4> kBrownNames{"k1", "k2", "p1", "p2"};
+  static constexpr std::array<const char*, 4> kFisheyeNames{"k1", "k2", "k3", "k4"};
+  const auto& names = camera.model == CameraModel::kKannalaBrandt ? kFisheyeNames : kBrownNames;
+  Json distortion = Json::object();
+  for (std::size_t i = 0; i < static_cast<std::size_t>(distortion_count(camera.model)); ++i) {
+    distortion[names[i]] = rounded(camera.distortion[i], kDistortionDigits);
+  }
+  return distortion;
+}
+
+Json to_json(const CameraReport& report) {
+  const Camera& camera = report.camera;
+  return {
+      {"component", report.component},
+      {"group", report.group},
+      {"images", report.images},
+      {"origin", to_string(report.origin)},
+      {"model", to_string(camera.model)},
+      {"width_px", camera.width_px},
+      {"height_px", camera.height_px},
+      {"fx_px", rounded(camera.fx_px, kPixelDigits)},
+      {"fy_px", rounded(camera.fy_px, kPixelDigits)},
+      {"cx_px", rounded(camera.cx_px, kPixelDigits)},
+      {"cy_px", rounded(camera.cy_px, kPixelDigits)},
+      {"distortion", distortion_to_json(camera)},
+      {"focal_35mm_equivalent_mm", rounded(report.focal_35mm_equivalent, 2)},
+      {"horizontal_fov_deg", rounded(report.horizontal_fov_deg, kAngleDigits)},
+  };
+}
+
+Json to_json(const std::optional<std::size_t>& value) {
+  return value ? Json(*value) : Json(nullptr);
+}
+
+Json to_json(const ImageReport& image) {
+  return {
+      {"name", image.name},
+      {"status", to_string(image.reason)},
+      {"detail", image.detail},
+      {"advice", image.advice},
+      {"component", to_json(image.component)},
+      {"camera_group", to_json(image.group)},
+      {"features", image.features},
+      {"overlapping_images", image.overlapping_images},
+      {"map_matches", image.map_matches},
+      {"map_inliers", image.map_inliers},
+      {"observations", image.observations},
+      {"reprojection_rmse_px", rounded(image.rmse_px, kPixelDigits)},
+  };
+}
+
+Json to_json(const PairEvidence& pair) {
+  return {
+      {"first", index(pair.pair.first)},
+      {"second", index(pair.pair.second)},
+      {"kind", to_string(pair.kind)},
+      {"candidates", pair.candidates},
+      {"inliers", pair.inliers},
+  };
+}
+
+Json to_json(const ReportSetting& setting) {
+  return {{"name", setting.name}, {"value", setting.value}};
+}
+
+Json to_json(const ReportNote& note) {
+  return {{"severity", to_string(note.severity)}, {"text", note.text}};
+}
+
+template <typename T>
+Json list(const std::vector<T>& values) {
+  Json array = Json::array();
+  for (const T& value : values) {
+    array.push_back(to_json(value));
+  }
+  return array;
+}
+
+Json summary(const ReconstructionReport& report) {
+  Json totals = {
+      {"images", report.images_total},
+      {"images_registered", report.images_registered},
+      {"images_in_other_components", report.images_in_other_components},
+      {"images_refused", report.images_refused},
+      {"components", report.components.size()},
+  };
+  Json numbers = to_json(report.overall);
+  numbers.erase("registered_images");
+  totals.update(numbers);
+  return totals;
+}
+
+}  // namespace
+
+std::string render_report_json(const ReconstructionReport& report) {
+  const Json document = {
+      {"schema", kSchema},
+      {"software", "trigmesh " + report.software_version},
+      {"input", report.input_description},
+      {"verdict", to_string(report.verdict)},
+      {"verdict_sentence", report.verdict_sentence},
+      {"units", report.units_sentence},
+      {"totals", summary(report)},
+      {"notes", list(report.notes)},
+      {"components", list(report.components)},
+      {"cameras", list(report.cameras)},
+      {"images", list(report.images)},
+      {"pairs", list(report.pairs)},
+      {"histograms",
+       {
+           {"reprojection_error_px", to_json(report.reprojection_error_px)},
+           {"track_length", to_json(report.track_length)},
+           {"triangulation_angle_deg", to_json(report.triangulation_angle_deg)},
+       }},
+      {"settings", list(report.settings)},
+  };
+  return document.dump(kIndent, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace trigmesh
