@@ -1,0 +1,248 @@
+#include "drivers/camera/replay/recording.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <map>
+#include <system_error>
+#include <utility>
+
+#include "drivers/camera/replay/frame_tables.hpp"
+#include "firmware/base/check.hpp"
+#include "firmware/base/file_bytes.hpp"
+
+namespace trigmesh {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kWhatIsAccepted =
+    "give a folder of *.jpg, *.jpeg or *.png files, a text file that lists them one a line, or a "
+    "recording (a folder "
+    "with images/)";
+
+/// By the extension, upper or lower case; nothing for files that are not pictures.
+std::optional<FrameFormat> format_of(const fs::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) {
+    return static_cast<char>(std::tolower(c));
+  });
+  if (extension == ".jpg" || extension == ".jpeg") {
+    return FrameFormat::kJpeg;
+  }
+  if (extension == ".png") {
+    return FrameFormat::kPng;
+  }
+  return std::nullopt;
+}
+
+bool is_hidden(const std::string& name) {
+  return !name.empty() && name.front() == '.';
+}
+
+/// Frames of a folder in natural order of their names, and what else lies in it.
+struct FolderContents {
+  std::vector<RecordedFrame> frames;
+  std::vector<std::string> ignored;
+};
+
+Result<FolderContents> list_folder(const fs::path& folder, std::size_t max_frames) {
+  FolderContents contents;
+  std::error_code error;
+  fs::directory_iterator entry(folder, error);
+  for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    const std::optional<FrameFormat> format = format_of(entry->path());
+    std::error_code type_error;
+    if (is_hidden(name)) {
+      continue;
+    }
+    if (!format || entry->is_directory(type_error) || !is_safe_frame_name(name)) {
+      contents.ignored.push_back(name);
+    } else {
+      contents.frames.push_back({name, entry->path(), std::nullopt, *format});
+    }
+    if (contents.frames.size() + contents.ignored.size() > max_frames) {
+      return fail(ErrorCode::kLimitExceeded,
+                  "{} holds more than {} files, the declared limit",
+                  folder.string(),
+                  max_frames);
+    }
+  }
+  if (error) {
+    return fail(ErrorCode::kIo, "cannot list folder {}: {}", folder.string(), error.message());
+  }
+  std::sort(
+      contents.frames.begin(),
+      contents.frames.end(),
+      [](const RecordedFrame& a, const RecordedFrame& b) { return natural_less(a.name, b.name); });
+  std::sort(contents.ignored.begin(), contents.ignored.end());
+  return contents;
+}
+
+/// The rows of the table as frames, in the order of time; what the folder has beyond the table goes
+/// to `ignored`.
+Result<FolderContents> order_by_time(FolderContents contents,
+                                     const std::vector<TimestampRow>& rows,
+                                     const fs::path& images) {
+  FolderContents ordered;
+  ordered.ignored = std::move(contents.ignored);
+  std::map<std::string, FrameFormat, std::less<>> unlisted;
+  for (const RecordedFrame& frame : contents.frames) {
+    unlisted.emplace(frame.name, frame.format);
+  }
+  for (const TimestampRow& row : rows) {
+    // A listed picture that is not there stays in the list: it becomes an Error of its own when it
+    // is read.
+    const std::optional<FrameFormat> format = format_of(row.name);
+    if (!format) {
+      return fail(ErrorCode::kCorruptData,
+                  "{}: '{}' is not a *.jpg, *.jpeg or *.png file",
+                  (images.parent_path() / "timestamps.csv").string(),
+                  row.name);
+    }
+    ordered.frames.push_back({row.name, images / row.name, row.timestamp, *format});
+    unlisted.erase(row.name);
+  }
+  std::stable_sort(ordered.frames.begin(),
+                   ordered.frames.end(),
+                   [](const RecordedFrame& a, const RecordedFrame& b) {
+                     return a.timestamp != b.timestamp ? a.timestamp < b.timestamp
+                                                       : natural_less(a.name, b.name);
+                   });
+  for (const auto& [name, format] : unlisted) {
+    ordered.ignored.push_back(name);
+  }
+  std::sort(ordered.ignored.begin(), ordered.ignored.end());
+  return ordered;
+}
+
+Result<FolderContents> list_recording(const fs::path& folder, const RecordingOptions& options) {
+  const fs::path images = folder / "images";
+  TM_ASSIGN_OR_RETURN(FolderContents contents, list_folder(images, options.max_frames));
+  const fs::path table = folder / "timestamps.csv";
+  std::error_code error;
+  if (!fs::exists(table, error)) {
+    return contents;
+  }
+  TM_ASSIGN_OR_RETURN(const std::vector<std::uint8_t> bytes,
+                      read_file_bytes(table, options.max_table_bytes));
+  TM_ASSIGN_OR_RETURN(const std::vector<TimestampRow> rows,
+                      parse_timestamps(as_text(bytes), table.string(), options.max_frames));
+  return order_by_time(std::move(contents), rows, images);
+}
+
+Result<FolderContents> list_from_file(const fs::path& list, const RecordingOptions& options) {
+  if (format_of(list)) {
+    return fail(
+        ErrorCode::kUnsupported, "{} is a single picture; {}", list.string(), kWhatIsAccepted);
+  }
+  TM_ASSIGN_OR_RETURN(const std::vector<std::uint8_t> bytes,
+                      read_file_bytes(list, options.max_table_bytes));
+  TM_ASSIGN_OR_RETURN(const std::vector<std::string> paths,
+                      parse_frame_list(as_text(bytes), list.string(), options.max_frames));
+  FolderContents contents;
+  for (const std::string& path : paths) {
+    const std::optional<FrameFormat> format = format_of(path);
+    if (format) {
+      contents.frames.push_back({path, list.parent_path() / path, std::nullopt, *format});
+    } else {
+      contents.ignored.push_back(path);
+    }
+  }
+  return contents;
+}
+
+Result<RecordingKind> kind_of(const fs::path& input) {
+  std::error_code error;
+  const fs::file_status status = fs::status(input, error);
+  if (status.type() == fs::file_type::not_found) {
+    return fail(ErrorCode::kNotFound, "there is no {}; {}", input.string(), kWhatIsAccepted);
+  }
+  if (error) {
+    return fail(ErrorCode::kIo, "cannot look at {}: {}", input.string(), error.message());
+  }
+  if (status.type() != fs::file_type::directory) {
+    return RecordingKind::kListFile;
+  }
+  return fs::is_directory(input / "images", error) ? RecordingKind::kRecording
+                                                   : RecordingKind::kPhotoFolder;
+}
+
+}  // namespace
+
+Result<> RecordingOptions::validate() const {
+  if (max_frames == 0 || max_frame_bytes == 0 || max_table_bytes == 0) {
+    return fail(
+        ErrorCode::kInvalidArgument,
+        "max_frames ({}), max_frame_bytes ({}) and max_table_bytes ({}) must be greater than 0",
+        max_frames,
+        max_frame_bytes,
+        max_table_bytes);
+  }
+  return {};
+}
+
+std::string_view to_string(RecordingKind kind) {
+  switch (kind) {
+    case RecordingKind::kPhotoFolder:
+      return "photo folder";
+    case RecordingKind::kListFile:
+      return "list file";
+    case RecordingKind::kRecording:
+      return "recording";
+  }
+  return "unknown";
+}
+
+Result<Recording> Recording::open(const fs::path& input, const RecordingOptions& options) {
+  TM_RETURN_IF_ERROR(options.validate());
+  Recording recording;
+  recording.options_ = options;
+  TM_ASSIGN_OR_RETURN(recording.kind_, kind_of(input));
+  Result<FolderContents> contents = [&] {
+    switch (recording.kind_) {
+      case RecordingKind::kRecording:
+        return list_recording(input, options);
+      case RecordingKind::kListFile:
+        return list_from_file(input, options);
+      case RecordingKind::kPhotoFolder:
+        break;
+    }
+    return list_folder(input, options.max_frames);
+  }();
+  if (!contents) {
+    return tl::unexpected<Error>(std::move(contents).error());
+  }
+  if (contents->frames.empty()) {
+    return fail(ErrorCode::kNotFound,
+                "no pictures in {} {} ({} other files); {}",
+                to_string(recording.kind_),
+                input.string(),
+                contents->ignored.size(),
+                kWhatIsAccepted);
+  }
+  recording.frames_ = std::move(contents->frames);
+  recording.ignored_ = std::move(contents->ignored);
+  return recording;
+}
+
+Result<Frame> Recording::frame(std::size_t index) const {
+  TM_CHECK(index < frames_.size());
+  const RecordedFrame& entry = frames_[index];
+  Frame frame{index, entry.name, entry.timestamp, entry.format, {}};
+  TM_ASSIGN_OR_RETURN(frame.bytes, read_file_bytes(entry.path, options_.max_frame_bytes));
+  if (frame.bytes.empty()) {
+    return fail(ErrorCode::kCorruptData, "{} is empty", entry.path.string());
+  }
+  return frame;
+}
+
+Result<std::optional<Frame>> ReplaySource::next() {
+  if (next_index_ == recording_.size()) {
+    return std::optional<Frame>();
+  }
+  TM_ASSIGN_OR_RETURN(Frame frame, recording_.frame(next_index_++));
+  return std::optional<Frame>(std::move(frame));
+}
+
+}  // namespace trigmesh

@@ -1,0 +1,99 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "drivers/camera/frame_source.hpp"
+#include "firmware/base/result.hpp"
+
+namespace trigmesh {
+
+/// Bounds on what a folder from outside may make us do.
+struct RecordingOptions {
+  /// Largest number of frames; more is kLimitExceeded. > 0.
+  std::size_t max_frames = 100'000;
+  /// Largest size of one picture file, bytes. > 0. A 100 megapixel JPEG has about 50 MB.
+  std::size_t max_frame_bytes = std::size_t{256} << 20U;
+  /// Largest size of a list file or timestamps.csv, bytes. > 0.
+  std::size_t max_table_bytes = std::size_t{16} << 20U;
+
+  [[nodiscard]] Result<> validate() const;
+};
+
+/// What an input on disk turned out to be.
+enum class RecordingKind {
+  kPhotoFolder,  ///< a folder with JPEG and PNG files, in natural order of their names (img2 before
+                 ///< img10)
+  kListFile,     ///< a text file with one path a line, relative to the list file; the order of the
+                 ///< lines
+  kRecording,    ///< a folder with images/ and perhaps timestamps.csv; the order of the timestamps
+};
+
+/// "photo folder", "list file", "recording".
+[[nodiscard]] std::string_view to_string(RecordingKind kind);
+
+/// One picture of a recording, not yet read.
+struct RecordedFrame {
+  std::string
+      name;  ///< relative to the image folder (list file: as written there), '/' as separator
+  std::filesystem::path path;
+  std::optional<std::chrono::nanoseconds> timestamp;
+  FrameFormat format = FrameFormat::kJpeg;
+};
+
+/// The table of contents of a recording or folder of photographs. Opening reads names and
+/// timestamps only; pictures are read when asked for, in any order. Thread-safe after opening: all
+/// members are const, so worker threads may read different frames at once. A file that disappears
+/// later gives an Error for its frame only.
+class Recording {
+ public:
+  /// Finds out what `input` is and lists its frames. kNotFound: no such path, or no pictures in it
+  /// (says where was looked); kIo: not readable; kCorruptData: a bad line in a list file or
+  /// timestamps.csv (names file and line); kLimitExceeded: more frames or bytes than the options
+  /// allow; kUnsupported: a file that is not a list.
+  [[nodiscard]] static Result<Recording> open(const std::filesystem::path& input,
+                                              const RecordingOptions& options = {});
+
+  [[nodiscard]] RecordingKind kind() const { return kind_; }
+
+  [[nodiscard]] std::size_t size() const { return frames_.size(); }
+
+  [[nodiscard]] const std::vector<RecordedFrame>& frames() const { return frames_; }
+
+  /// Names of files in the image folder that are not used: not *.jpg, *.jpeg or *.png, or not in
+  /// timestamps.csv; sorted.
+  [[nodiscard]] const std::vector<std::string>& ignored() const { return ignored_; }
+
+  /// Reads one picture. Precondition: index < size(). kNotFound, kIo, kLimitExceeded; kCorruptData
+  /// when the file is empty.
+  [[nodiscard]] Result<Frame> frame(std::size_t index) const;
+
+ private:
+  Recording() = default;
+
+  RecordingOptions options_;
+  RecordingKind kind_ = RecordingKind::kPhotoFolder;
+  std::vector<RecordedFrame> frames_;
+  std::vector<std::string> ignored_;
+};
+
+/// The frames of a recording one after the other.
+class ReplaySource final : public FrameSource {
+ public:
+  explicit ReplaySource(Recording recording) : recording_(std::move(recording)) {}
+
+  [[nodiscard]] Result<std::optional<Frame>> next() override;
+
+  [[nodiscard]] const Recording& recording() const { return recording_; }
+
+ private:
+  Recording recording_;
+  std::size_t next_index_ = 0;
+};
+
+}  // namespace trigmesh

@@ -1,0 +1,185 @@
+#include "drivers/camera/replay/recording.hpp"
+
+#include <fstream>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include <unistd.h>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace trigmesh {
+namespace {
+
+namespace fs = std::filesystem;
+using std::chrono::nanoseconds;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+/// A folder of its own for each test, removed afterwards.
+class RecordingTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (fs::temp_directory_path() / "trigmesh_recording_XXXXXX").string();
+    ASSERT_NE(mkdtemp(name.data()), nullptr);
+    root_ = name;
+  }
+
+  void TearDown() override {
+    std::error_code ignored;
+    fs::remove_all(root_, ignored);
+  }
+
+  void write(const std::string& name, const std::string& content = "pixels") const {
+    fs::create_directories((root_ / name).parent_path());
+    std::ofstream(root_ / name, std::ios::binary) << content;
+  }
+
+  static std::vector<std::string> names(const Recording& recording) {
+    std::vector<std::string> result;
+    for (const RecordedFrame& frame : recording.frames()) {
+      result.push_back(frame.name);
+    }
+    return result;
+  }
+
+  fs::path root_;
+};
+
+TEST_F(RecordingTest, ListsPhotographsInNaturalOrderAndCountsTheRest) {
+  for (const char* name : {"IMG_10.JPG", "IMG_9.jpeg", "IMG_11.png", "notes.txt", ".hidden.jpg"}) {
+    write(name);
+  }
+  const auto recording = Recording::open(root_);
+  ASSERT_TRUE(recording) << recording.error().message;
+  EXPECT_EQ(recording->kind(), RecordingKind::kPhotoFolder);
+  EXPECT_THAT(names(*recording), ElementsAre("IMG_9.jpeg", "IMG_10.JPG", "IMG_11.png"));
+  EXPECT_THAT(recording->ignored(), ElementsAre("notes.txt"));
+  EXPECT_EQ(recording->frames()[2].format, FrameFormat::kPng);
+  EXPECT_FALSE(recording->frames()[0].timestamp);
+}
+
+TEST_F(RecordingTest, OrdersRecordingByTimestamp) {
+  write("images/a.jpg", "first name");
+  write("images/b.jpg", "second name");
+  write("images/extra.jpg");
+  write("timestamps.csv", "name,timestamp_ns\na.jpg,200\nb.jpg,100\n");
+  const auto recording = Recording::open(root_);
+  ASSERT_TRUE(recording) << recording.error().message;
+  EXPECT_EQ(recording->kind(), RecordingKind::kRecording);
+  EXPECT_THAT(names(*recording), ElementsAre("b.jpg", "a.jpg"));
+  EXPECT_THAT(recording->ignored(), ElementsAre("extra.jpg"));
+  const auto frame = recording->frame(0);
+  ASSERT_TRUE(frame) << frame.error().message;
+  EXPECT_EQ(frame->timestamp, nanoseconds(100));
+  EXPECT_EQ(std::string(frame->bytes.begin(), frame->bytes.end()), "second name");
+}
+
+TEST_F(RecordingTest, AcceptsRecordingWithoutTimestamps) {
+  write("images/2.jpg");
+  write("images/10.jpg");
+  const auto recording = Recording::open(root_);
+  ASSERT_TRUE(recording) << recording.error().message;
+  EXPECT_THAT(names(*recording), ElementsAre("2.jpg", "10.jpg"));
+}
+
+TEST_F(RecordingTest, ResolvesListRelativeToTheListFile) {
+  write("photos/a.jpg", "A");
+  write("photos/b.jpg", "B");
+  write("lists/mine.txt", "# chosen\n../photos/b.jpg\n../photos/a.jpg\n");
+  const auto recording = Recording::open(root_ / "lists" / "mine.txt");
+  ASSERT_TRUE(recording) << recording.error().message;
+  EXPECT_EQ(recording->kind(), RecordingKind::kListFile);
+  EXPECT_THAT(names(*recording), ElementsAre("../photos/b.jpg", "../photos/a.jpg"));
+  const auto frame = recording->frame(0);
+  ASSERT_TRUE(frame) << frame.error().message;
+  EXPECT_EQ(frame->bytes, std::vector<std::uint8_t>{'B'});
+}
+
+TEST_F(RecordingTest, SaysWhatWasTriedWhenThereIsNothing) {
+  const auto missing = Recording::open(root_ / "nowhere");
+  ASSERT_FALSE(missing);
+  EXPECT_EQ(missing.error().code, ErrorCode::kNotFound);
+  EXPECT_THAT(missing.error().message, HasSubstr("nowhere"));
+
+  write("notes.txt", "");
+  const auto empty = Recording::open(root_);
+  ASSERT_FALSE(empty);
+  EXPECT_EQ(empty.error().code, ErrorCode::kNotFound);
+  EXPECT_THAT(empty.error().message, HasSubstr("1 other files"));
+
+  const auto empty_list = Recording::open(root_ / "notes.txt");
+  ASSERT_FALSE(empty_list);
+  EXPECT_EQ(empty_list.error().code, ErrorCode::kNotFound);
+}
+
+TEST_F(RecordingTest, RefusesSinglePictureAsList) {
+  write("a.jpg");
+  const auto recording = Recording::open(root_ / "a.jpg");
+  ASSERT_FALSE(recording);
+  EXPECT_EQ(recording.error().code, ErrorCode::kUnsupported);
+}
+
+TEST_F(RecordingTest, KeepsDeclaredLimits) {
+  write("a.jpg", "123456");
+  write("b.jpg", "12");
+  RecordingOptions options;
+  options.max_frames = 1;
+  const auto too_many = Recording::open(root_, options);
+  ASSERT_FALSE(too_many);
+  EXPECT_EQ(too_many.error().code, ErrorCode::kLimitExceeded);
+
+  options.max_frames = 2;
+  options.max_frame_bytes = 5;
+  const auto recording = Recording::open(root_, options);
+  ASSERT_TRUE(recording) << recording.error().message;
+  const auto too_big = recording->frame(0);
+  ASSERT_FALSE(too_big);
+  EXPECT_EQ(too_big.error().code, ErrorCode::kLimitExceeded);
+  EXPECT_TRUE(recording->frame(1));
+
+  options.max_frames = 0;
+  EXPECT_EQ(Recording::open(root_, options).error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST_F(RecordingTest, ReplayGoesOnAfterAFrameThatCannotBeRead) {
+  write("images/a.jpg");
+  write("images/c.jpg");
+  write("images/d.jpg", "");
+  write("timestamps.csv", "name,timestamp_ns\na.jpg,1\nb.jpg,2\nc.jpg,3\nd.jpg,4\n");
+  auto recording = Recording::open(root_);
+  ASSERT_TRUE(recording) << recording.error().message;
+  ReplaySource source(*std::move(recording));
+
+  const auto first = source.next();
+  ASSERT_TRUE(first);
+  ASSERT_TRUE(first->has_value());
+  EXPECT_EQ((*first)->name, "a.jpg");
+  const auto missing = source.next();
+  ASSERT_FALSE(missing);
+  EXPECT_EQ(missing.error().code, ErrorCode::kNotFound);
+  const auto third = source.next();
+  ASSERT_TRUE(third);
+  ASSERT_TRUE(third->has_value());
+  EXPECT_EQ((*third)->index, 2U);
+  const auto empty = source.next();
+  ASSERT_FALSE(empty);
+  EXPECT_EQ(empty.error().code, ErrorCode::kCorruptData);
+  const auto end = source.next();
+  ASSERT_TRUE(end);
+  EXPECT_FALSE(end->has_value());
+}
+
+TEST_F(RecordingTest, ReportsTheLineOfABadTimestampTable) {
+  write("images/a.jpg");
+  write("timestamps.csv", "name,timestamp_ns\na.jpg,soon\n");
+  const auto recording = Recording::open(root_);
+  ASSERT_FALSE(recording);
+  EXPECT_EQ(recording.error().code, ErrorCode::kCorruptData);
+  EXPECT_THAT(recording.error().message, HasSubstr("timestamps.csv:2"));
+}
+
+}  // namespace
+}  // namespace trigmesh
