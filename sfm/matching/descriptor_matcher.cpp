@@ -14,10 +14,14 @@ using internal::DescriptorRows;
 using internal::NearestTwo;
 using internal::ScanResult;
 
-/// Reads exact nearest neighbours out of a scan: finds the row within a group, and looks again where lanes were full.
+/// Reads exact nearest neighbours out of a scan: finds the row within a group, and looks again
+/// where lanes were full.
 class ScanReader {
  public:
-  ScanReader(const DescriptorRows& a, std::size_t count_a, const DescriptorRows& b, std::size_t count_b)
+  ScanReader(const DescriptorRows& a,
+             std::size_t count_a,
+             const DescriptorRows& b,
+             std::size_t count_b)
       : a_(a), b_(b), count_a_(count_a), count_b_(count_b) {}
 
   [[nodiscard]] NearestTwo row(const ScanResult& scan, std::size_t i) const {
@@ -38,7 +42,9 @@ class ScanReader {
       return search(b_, j, a_, count_a_);
     }
     NearestTwo out = raw;
-    for (std::size_t i = raw.position; i < std::min<std::size_t>(raw.position + scan.rows_per_group, count_a_); ++i) {
+    for (std::size_t i = raw.position;
+         i < std::min<std::size_t>(raw.position + scan.rows_per_group, count_a_);
+         ++i) {
       const std::int32_t exact = internal::similarity(b_, j, a_, i);
       if (std::min(exact, scan.ceiling) == raw.best) {
         out.best = exact;
@@ -51,7 +57,10 @@ class ScanReader {
 
  private:
   /// One row of the matrix without any ceiling.
-  static NearestTwo search(const DescriptorRows& from, std::size_t i, const DescriptorRows& in, std::size_t count) {
+  static NearestTwo search(const DescriptorRows& from,
+                           std::size_t i,
+                           const DescriptorRows& in,
+                           std::size_t count) {
     NearestTwo out;
     for (std::size_t j = 0; j < count; ++j) {
       const std::int32_t score = internal::similarity(from, i, in, j);
@@ -79,9 +88,11 @@ Result<DescriptorIndex> DescriptorIndex::build(const FeatureSet& features) {
                 features.size(),
                 internal::kMaxDescriptors);
   }
-  if (features.size() > 0 &&
-      (features.descriptor_bytes == 0 || features.descriptor_bytes > internal::kMaxDescriptorBytes)) {
-    return fail(ErrorCode::kInvalidArgument, "descriptors of {} bytes cannot be matched", features.descriptor_bytes);
+  if (features.size() > 0 && (features.descriptor_bytes == 0 ||
+                              features.descriptor_bytes > internal::kMaxDescriptorBytes)) {
+    return fail(ErrorCode::kInvalidArgument,
+                "descriptors of {} bytes cannot be matched",
+                features.descriptor_bytes);
   }
   if (features.descriptors.size() != features.size() * features.descriptor_bytes) {
     return fail(ErrorCode::kInvalidArgument,
@@ -101,11 +112,14 @@ Result<DescriptorIndex> DescriptorIndex::build(const FeatureSet& features) {
       all_bits = static_cast<std::uint8_t>(all_bits | byte);
     }
     if (all_bits > 127) {
-      return fail(ErrorCode::kInvalidArgument, "a {} descriptor has a byte above 127", to_string(features.kind));
+      return fail(ErrorCode::kInvalidArgument,
+                  "a {} descriptor has a byte above 127",
+                  to_string(features.kind));
     }
     out.lengths_.resize(out.size());
     for (std::size_t i = 0; i < out.size(); ++i) {
-      out.lengths_[i] = std::sqrt(static_cast<double>(internal::similarity(out.rows_, i, out.rows_, i)));
+      out.lengths_[i] =
+          std::sqrt(static_cast<double>(internal::similarity(out.rows_, i, out.rows_, i)));
     }
   }
   out.interleaved_ = internal::interleave(out.rows_);
@@ -144,7 +158,8 @@ std::vector<FeatureMatch> match_descriptors(const DescriptorIndex& a,
   const DescriptorMetric metric = a.rows().metric;
   TM_CHECK(metric == b.rows().metric && a.rows().descriptor_bytes == b.rows().descriptor_bytes);
 
-  const ScanResult scan = internal::scan_all_pairs(a.rows(), count_a, b.rows(), b.interleaved(), count_b);
+  const ScanResult scan =
+      internal::scan_all_pairs(a.rows(), count_a, b.rows(), b.interleaved(), count_b);
   const ScanReader reader(a.rows(), count_a, b.rows(), count_b);
   std::vector<FeatureMatch> matches;
   for (std::size_t i = 0; i < count_a; ++i) {
@@ -153,8 +168,9 @@ std::vector<FeatureMatch> match_descriptors(const DescriptorIndex& a,
     }
     const NearestTwo in_b = reader.row(scan, i);
     const auto length_product = [&] {
-      return metric == DescriptorMetric::kHamming ? static_cast<double>(8 * a.rows().descriptor_bytes)
-                                                  : a.length(i) * b.length(in_b.position);
+      return metric == DescriptorMetric::kHamming
+                 ? static_cast<double>(8 * a.rows().descriptor_bytes)
+                 : a.length(i) * b.length(in_b.position);
     };
     if (!passes_ratio_test(metric, in_b.best, in_b.second, length_product(), options.max_ratio)) {
       continue;

@@ -1,22 +1,21 @@
-// Every descriptor of one image against every one of another, with the two nearest neighbours in both directions from one
-// pass over the similarity matrix.
+// Every descriptor of one image against every one of another, with the two nearest neighbours in
+// both directions from one pass over the similarity matrix.
 //
-// A tile of kRowsPerGroup queries times two vectors of database descriptors is accumulated in registers. Each lane belongs to
-// another database descriptor (see InterleavedRows), so there are no horizontal sums, and the running two best of a row or
-// column are lane-wise max/min. Cost per vector of pairs: 64 multiply-adds and about 8 operations for the two best.
+// A tile of kRowsPerGroup queries times two vectors of database descriptors is accumulated in
+// registers. Each lane belongs to another database descriptor (see InterleavedRows), so there are
+// no horizontal sums, and the running two best of a row or column are lane-wise max/min. Cost per
+// vector of pairs: 64 multiply-adds and about 8 operations for the two best.
 //
-// Dot products: bytes are at most 127, so a pair of products fits 16 bits (2 * 127^2 = 32258), and the sum is accumulated in
-// 16 bits with saturation, from -32768: a similarity of 65535 or more is reported as the ceiling 65535 and looked at again by
-// the caller. With VNNI the sums have 32 bits and are exact.
+// Dot products: bytes are at most 127, so a pair of products fits 16 bits (2 * 127^2 = 32258), and
+// the sum is accumulated in 16 bits with saturation, from -32768: a similarity of 65535 or more is
+// reported as the ceiling 65535 and looked at again by the caller. With VNNI the sums have 32 bits
+// and are exact.
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "sfm/matching/match_kernel.cpp"
 // SVE vectors cannot be kept in arrays; such machines run the NEON code.
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
 #define HWY_WANT_AVX3_DL
-#include <hwy/foreach_target.h>
-#include <hwy/highway.h>
-
 #include "sfm/matching/match_kernel.hpp"
 
 #include <algorithm>
@@ -24,17 +23,25 @@
 #include <cstring>
 #include <limits>
 
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
 #if HWY_TARGET == HWY_AVX3_DL
-// Highway 1.0.3 names AVX-VNNI here, but its run-time check for this target is for AVX512-VNNI, which is what we use.
+// Highway 1.0.3 names AVX-VNNI here, but its run-time check for this target is for AVX512-VNNI,
+// which is what we use.
 #undef HWY_TARGET_STR
 #define HWY_TARGET_STR \
-  HWY_TARGET_STR_AVX3 ",vpclmulqdq,avx512vbmi,avx512vbmi2,vaes,avxvnni,avx512vnni,avx512bitalg,avx512vpopcntdq"
+  HWY_TARGET_STR_AVX3  \
+  ",vpclmulqdq,avx512vbmi,avx512vbmi2,vaes,avxvnni,avx512vnni,avx512bitalg,avx512vpopcntdq"
 #endif
 
 HWY_BEFORE_NAMESPACE();
 
 namespace trigmesh::internal {
 namespace HWY_NAMESPACE {
+namespace {
+
+#if HWY_TARGET != HWY_SCALAR
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -51,6 +58,74 @@ using V8 = hn::Vec<D8>;
 using V16 = hn::Vec<D16>;
 using V32 = hn::Vec<D32>;
 
+#endif  // HWY_TARGET != HWY_SCALAR
+
+/// Dot product of bytes below 128: those are the same signed.
+std::int32_t dot_product(const std::uint8_t* HWY_RESTRICT a,
+                         const std::uint8_t* HWY_RESTRICT b,
+                         std::size_t count) {
+  std::int32_t sum = 0;
+  std::size_t i = 0;
+#if HWY_TARGET != HWY_SCALAR
+  const D16 d16;
+  const D32 d32;
+  const hn::Rebind<std::int8_t, D16> d8;
+  auto sum0 = hn::Zero(d32);
+  auto sum1 = hn::Zero(d32);
+  const auto* a_signed = reinterpret_cast<const std::int8_t*>(a);
+  const auto* b_signed = reinterpret_cast<const std::int8_t*>(b);
+  for (; i + hn::MaxLanes(d8) <= count; i += hn::MaxLanes(d8)) {
+    const auto values_a = hn::PromoteTo(d16, hn::LoadU(d8, a_signed + i));
+    const auto values_b = hn::PromoteTo(d16, hn::LoadU(d8, b_signed + i));
+    sum0 = hn::ReorderWidenMulAccumulate(d32, values_a, values_b, sum0, sum1);
+  }
+  sum = hn::GetLane(hn::SumOfLanes(d32, hn::Add(sum0, sum1)));
+#endif
+  for (; i < count; ++i) {
+    sum += std::int32_t{a[i]} * std::int32_t{b[i]};
+  }
+  return sum;
+}
+
+std::int32_t equal_bits(const std::uint8_t* HWY_RESTRICT a,
+                        const std::uint8_t* HWY_RESTRICT b,
+                        std::size_t count) {
+  std::size_t differing = 0;
+  std::size_t i = 0;
+  for (; i + 8 <= count; i += 8) {
+    std::uint64_t word_a = 0;
+    std::uint64_t word_b = 0;
+    std::memcpy(&word_a, a + i, 8);
+    std::memcpy(&word_b, b + i, 8);
+    differing += hwy::PopCount(word_a ^ word_b);
+  }
+  for (; i < count; ++i) {
+    differing += hwy::PopCount(static_cast<std::uint64_t>(a[i] ^ b[i]));
+  }
+  return static_cast<std::int32_t>(8 * count - differing);
+}
+
+std::int32_t similarity_impl(const DescriptorRows& a,
+                             std::size_t i,
+                             const DescriptorRows& b,
+                             std::size_t j) {
+  return a.metric == DescriptorMetric::kDotProduct
+             ? dot_product(a.row(i), b.row(j), a.descriptor_bytes)
+             : equal_bits(a.row(i), b.row(j), a.descriptor_bytes);
+}
+
+void similarities_impl(const DescriptorRows& a,
+                       std::size_t i,
+                       const DescriptorRows& b,
+                       std::span<const std::uint32_t> candidates,
+                       std::int32_t* scores) {
+  for (std::size_t c = 0; c < candidates.size(); ++c) {
+    scores[c] = similarity_impl(a, i, b, candidates[c]);
+  }
+}
+
+#if HWY_TARGET != HWY_SCALAR
+
 /// Dot products of bytes 0..127 in 16-bit lanes, with saturation.
 struct DotProduct16 {
   using D = D16;
@@ -59,19 +134,18 @@ struct DotProduct16 {
   static constexpr std::int32_t kCeiling = 65535;
   static constexpr std::size_t kStepsPerFlush = std::numeric_limits<std::size_t>::max();
 
-  static HWY_INLINE V16 start() { return hn::Set(D16(), static_cast<std::int16_t>(kBias)); }
-
-  static HWY_INLINE V16 accumulate(V16 sum, V8 database, V8 query) {
+  /// Two products in each 16-bit lane, at most 2 * 127^2.
+  static HWY_INLINE V16 multiply(V8 database, V8 query) {
 #if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX3_DL
-    return V16{_mm512_adds_epi16(sum.raw, _mm512_maddubs_epi16(database.raw, query.raw))};
+    return V16{_mm512_maddubs_epi16(database.raw, query.raw)};
 #elif HWY_TARGET == HWY_AVX2
-    return V16{_mm256_adds_epi16(sum.raw, _mm256_maddubs_epi16(database.raw, query.raw))};
+    return V16{_mm256_maddubs_epi16(database.raw, query.raw)};
 #elif HWY_TARGET == HWY_SSE4 || HWY_TARGET == HWY_SSSE3
-    return V16{_mm_adds_epi16(sum.raw, _mm_maddubs_epi16(database.raw, query.raw))};
+    return V16{_mm_maddubs_epi16(database.raw, query.raw)};
 #elif HWY_TARGET == HWY_NEON && HWY_ARCH_ARM_A64
     const uint16x8_t low = vmull_u8(vget_low_u8(database.raw), vget_low_u8(query.raw));
     const uint16x8_t high = vmull_high_u8(database.raw, query.raw);
-    return V16(vqaddq_s16(sum.raw, vreinterpretq_s16_u16(vpaddq_u16(low, high))));
+    return V16(vreinterpretq_s16_u16(vpaddq_u16(low, high)));
 #else
     const D16 d;
     const V16 low_byte = hn::Set(d, std::int16_t{0xFF});
@@ -79,11 +153,23 @@ struct DotProduct16 {
     const V16 query_words = hn::BitCast(d, query);
     const V16 even = hn::Mul(hn::And(words, low_byte), hn::And(query_words, low_byte));
     const V16 odd = hn::Mul(hn::ShiftRight<8>(words), hn::ShiftRight<8>(query_words));
-    return hn::SaturatedAdd(sum, hn::Add(even, odd));
+    return hn::Add(even, odd);
 #endif
   }
 
-  static HWY_INLINE V16 flush(V16 sum, V16 /*total*/) { return sum; }
+  /// Four products fit an unsigned lane (64516), so only every second addition must saturate; on
+  /// Intel those run on fewer ports.
+  static HWY_INLINE V16 accumulate(V16 sum, V8 database0, V8 query0, V8 database1, V8 query1) {
+    const DU16 d;
+    const auto four =
+        hn::BitCast(d, hn::Add(multiply(database0, query0), multiply(database1, query1)));
+    return hn::BitCast(D16(), hn::SaturatedAdd(hn::BitCast(d, sum), four));
+  }
+
+  /// Unsigned to signed order.
+  static HWY_INLINE V16 flush(V16 sum, V16 /*total*/) {
+    return hn::Xor(sum, hn::Set(D16(), static_cast<std::int16_t>(kBias)));
+  }
 };
 
 #if HWY_TARGET == HWY_AVX3_DL
@@ -95,20 +181,17 @@ struct DotProduct32 {
   static constexpr std::int32_t kCeiling = std::numeric_limits<std::int32_t>::max();
   static constexpr std::size_t kStepsPerFlush = std::numeric_limits<std::size_t>::max();
 
-  static HWY_INLINE V32 start() { return hn::Zero(D32()); }
-
-  static HWY_INLINE V32 accumulate(V32 sum, V8 database, V8 query) {
-    return V32{_mm512_dpbusd_epi32(sum.raw, database.raw, query.raw)};
+  static HWY_INLINE V32 accumulate(V32 sum, V8 database0, V8 query0, V8 database1, V8 query1) {
+    const __m512i first = _mm512_dpbusd_epi32(sum.raw, database0.raw, query0.raw);
+    return V32{_mm512_dpbusd_epi32(first, database1.raw, query1.raw)};
   }
 
   static HWY_INLINE V32 flush(V32 sum, V32 /*total*/) { return sum; }
 };
-using DotProduct = DotProduct32;
-#else
-using DotProduct = DotProduct16;
 #endif
 
-/// Differing bits. Bytes are counted apart for 16 steps (at most 128 each), then added to the lanes.
+/// Differing bits. Bytes are counted apart for 16 steps (at most 128 each), then added to the
+/// lanes.
 struct HammingDistance {
   using D = D16;
   static constexpr std::size_t kBytesPerLane = 2;
@@ -116,12 +199,10 @@ struct HammingDistance {
   static constexpr std::int32_t kCeiling = std::numeric_limits<std::int32_t>::max();
   static constexpr std::size_t kStepsPerFlush = 16;
 
-  static HWY_INLINE V16 start() { return hn::Zero(D16()); }
-
-  static HWY_INLINE V16 accumulate(V16 sum, V8 database, V8 query) {
-    const D8 d;
-    const V8 bits = hn::PopulationCount(hn::Xor(database, query));
-    return hn::BitCast(D16(), hn::Add(hn::BitCast(d, sum), bits));
+  static HWY_INLINE V16 accumulate(V16 sum, V8 database0, V8 query0, V8 database1, V8 query1) {
+    const V8 bits0 = hn::PopulationCount(hn::Xor(database0, query0));
+    const V8 bits1 = hn::PopulationCount(hn::Xor(database1, query1));
+    return hn::BitCast(D16(), hn::Add(hn::BitCast(D8(), sum), hn::Add(bits0, bits1)));
   }
 
   static HWY_INLINE V16 flush(V16 sum, V16 total) {
@@ -139,9 +220,11 @@ using VectorOf = hn::Vec<typename Scorer::D>;
 template <class Scorer>
 constexpr std::size_t kLanes = hn::MaxLanes(typename Scorer::D());
 
+/// Always even: the kernel takes two steps at a time.
 template <class Scorer>
 constexpr std::size_t steps_of(std::size_t descriptor_bytes) {
-  return (descriptor_bytes + Scorer::kBytesPerLane - 1) / Scorer::kBytesPerLane;
+  constexpr std::size_t kBytesInTwoSteps = 2 * Scorer::kBytesPerLane;
+  return 2 * ((descriptor_bytes + kBytesInTwoSteps - 1) / kBytesInTwoSteps);
 }
 
 template <class Scorer>
@@ -152,35 +235,44 @@ InterleavedRows interleave_for(const DescriptorRows& rows) {
   InterleavedRows out;
   out.descriptors_per_block = kVectorsPerBlock * kLaneCount;
   out.bytes_per_block = steps * out.descriptors_per_block * kWidth;
-  const std::size_t blocks = (rows.count + out.descriptors_per_block - 1) / out.descriptors_per_block;
-  out.lines.assign((blocks * out.bytes_per_block + sizeof(CacheLine) - 1) / sizeof(CacheLine), CacheLine{});
+  const std::size_t blocks =
+      (rows.count + out.descriptors_per_block - 1) / out.descriptors_per_block;
+  out.lines.assign((blocks * out.bytes_per_block + sizeof(CacheLine) - 1) / sizeof(CacheLine),
+                   CacheLine{});
   auto* bytes = reinterpret_cast<std::uint8_t*>(out.lines.data());
   for (std::size_t i = 0; i < rows.count; ++i) {
     const std::size_t lane = i % out.descriptors_per_block;
-    std::uint8_t* target = bytes + (i / out.descriptors_per_block) * out.bytes_per_block + lane * kWidth;
+    std::uint8_t* target =
+        bytes + (i / out.descriptors_per_block) * out.bytes_per_block + lane * kWidth;
     const std::uint8_t* source = rows.row(i);
     const std::size_t stride = out.descriptors_per_block * kWidth;
     const std::size_t whole_steps = rows.descriptor_bytes / kWidth;
     for (std::size_t s = 0; s < whole_steps; ++s) {
       std::memcpy(target + s * stride, source + s * kWidth, kWidth);
     }
-    std::memcpy(target + whole_steps * stride, source + whole_steps * kWidth, rows.descriptor_bytes % kWidth);
+    std::memcpy(target + whole_steps * stride,
+                source + whole_steps * kWidth,
+                rows.descriptor_bytes % kWidth);
   }
   return out;
 }
 
-/// Queries of one tile as the kernel reads them: word [group][step][row in group], a pair of bytes written twice when lanes
-/// have 16 bits. Rows past the end are zero.
+/// Queries of one tile as the kernel reads them: word [group][step][row in group], a pair of bytes
+/// written twice when lanes have 16 bits. Rows past the end are zero.
 template <class Scorer>
-void spread_queries(const DescriptorRows& a, std::size_t first, std::size_t count, std::vector<std::uint32_t>& words) {
+void spread_queries(const DescriptorRows& a,
+                    std::size_t first,
+                    std::size_t count,
+                    std::vector<std::uint32_t>& words) {
   const std::size_t steps = steps_of<Scorer>(a.descriptor_bytes);
   const std::size_t groups = (count + kRowsPerGroup - 1) / kRowsPerGroup;
   words.assign(groups * steps * kRowsPerGroup, 0);
   for (std::size_t i = 0; i < count; ++i) {
     const std::uint8_t* row = a.row(first + i);
-    std::uint32_t* target = words.data() + (i / kRowsPerGroup) * steps * kRowsPerGroup + i % kRowsPerGroup;
-    for (std::size_t s = 0; s < steps; ++s) {
-      const std::size_t begin = s * Scorer::kBytesPerLane;
+    std::uint32_t* target =
+        words.data() + (i / kRowsPerGroup) * steps * kRowsPerGroup + i % kRowsPerGroup;
+    for (std::size_t begin = 0, s = 0; begin < a.descriptor_bytes;
+         begin += Scorer::kBytesPerLane, ++s) {
       std::uint32_t word = 0;
       std::memcpy(&word, row + begin, std::min(Scorer::kBytesPerLane, a.descriptor_bytes - begin));
       target[s * kRowsPerGroup] = Scorer::kBytesPerLane == 2 ? word * 0x10001U : word;
@@ -201,23 +293,25 @@ HWY_INLINE void accumulate_tile(const std::uint8_t* HWY_RESTRICT block,
                                 Tile<Scorer>& tile) {
   const D8 d8;
   const DU32 d32;
+  constexpr std::size_t kBytes = hn::MaxLanes(d8);
   VectorOf<Scorer> sum[kRowsPerGroup][kVectorsPerBlock];
 #pragma GCC unroll 8
   for (std::size_t r = 0; r < kRowsPerGroup; ++r) {
-    sum[r][0] = Scorer::start();
-    sum[r][1] = Scorer::start();
+    sum[r][0] = hn::Zero(typename Scorer::D());
+    sum[r][1] = hn::Zero(typename Scorer::D());
   }
-  for (std::size_t s = 0; s < steps; ++s) {
-    const V8 database0 = hn::Load(d8, block);
-    const V8 database1 = hn::Load(d8, block + hn::MaxLanes(d8));
-    block += kVectorsPerBlock * hn::MaxLanes(d8);
+  for (std::size_t s = 0; s < steps; s += 2) {
+    const V8 step0[2] = {hn::Load(d8, block), hn::Load(d8, block + kBytes)};
+    const V8 step1[2] = {hn::Load(d8, block + 2 * kBytes), hn::Load(d8, block + 3 * kBytes)};
+    block += 2 * kVectorsPerBlock * kBytes;
 #pragma GCC unroll 8
     for (std::size_t r = 0; r < kRowsPerGroup; ++r) {
-      const V8 query = hn::BitCast(d8, hn::Set(d32, queries[r]));
-      sum[r][0] = Scorer::accumulate(sum[r][0], database0, query);
-      sum[r][1] = Scorer::accumulate(sum[r][1], database1, query);
+      const V8 query0 = hn::BitCast(d8, hn::Set(d32, queries[r]));
+      const V8 query1 = hn::BitCast(d8, hn::Set(d32, queries[kRowsPerGroup + r]));
+      sum[r][0] = Scorer::accumulate(sum[r][0], step0[0], query0, step1[0], query1);
+      sum[r][1] = Scorer::accumulate(sum[r][1], step0[1], query0, step1[1], query1);
     }
-    queries += kRowsPerGroup;
+    queries += 2 * kRowsPerGroup;
   }
 #pragma GCC unroll 8
   for (std::size_t r = 0; r < kRowsPerGroup; ++r) {
@@ -243,7 +337,10 @@ HWY_INLINE void score_tile(const std::uint8_t* block,
     }
     for (std::size_t s = 0; s < steps; s += Scorer::kStepsPerFlush) {
       const std::size_t some = std::min(Scorer::kStepsPerFlush, steps - s);
-      accumulate_tile<Scorer>(block + s * kVectorsPerBlock * hn::MaxLanes(D8()), queries + s * kRowsPerGroup, some, tile);
+      accumulate_tile<Scorer>(block + s * kVectorsPerBlock * hn::MaxLanes(D8()),
+                              queries + s * kRowsPerGroup,
+                              some,
+                              tile);
     }
     const auto all = hn::Set(d, static_cast<LaneOf<Scorer>>(bits));
     for (auto& row : tile.score) {
@@ -261,7 +358,8 @@ void clear_outside(std::size_t rows, std::size_t lanes, Tile<Scorer>& tile) {
   for (std::size_t r = 0; r < kRowsPerGroup; ++r) {
     for (std::size_t v = 0; v < kVectorsPerBlock; ++v) {
       const std::size_t begin = v * kLanes<Scorer>;
-      const std::size_t valid = r < rows ? std::clamp<std::size_t>(lanes, begin, begin + kLanes<Scorer>) - begin : 0;
+      const std::size_t valid =
+          r < rows ? std::clamp<std::size_t>(lanes, begin, begin + kLanes<Scorer>) - begin : 0;
       tile.score[r][v] = hn::IfThenElse(hn::FirstN(d, valid), tile.score[r][v], none);
     }
   }
@@ -291,7 +389,9 @@ struct alignas(64) LaneState {
 };
 
 template <class Scorer>
-HWY_INLINE void update_rows(const Tile<Scorer>& tile, std::size_t block, LaneState<Scorer>* states) {
+HWY_INLINE void update_rows(const Tile<Scorer>& tile,
+                            std::size_t block,
+                            LaneState<Scorer>* states) {
   const auto group = hn::Set(typename Scorer::D(), static_cast<LaneOf<Scorer>>(block));
 #pragma GCC unroll 8
   for (std::size_t r = 0; r < kRowsPerGroup; ++r) {
@@ -302,7 +402,9 @@ HWY_INLINE void update_rows(const Tile<Scorer>& tile, std::size_t block, LaneSta
 }
 
 template <class Scorer>
-HWY_INLINE void update_columns(const Tile<Scorer>& tile, std::size_t row_group, LaneState<Scorer>* states) {
+HWY_INLINE void update_columns(const Tile<Scorer>& tile,
+                               std::size_t row_group,
+                               LaneState<Scorer>* states) {
   const auto group = hn::Set(typename Scorer::D(), static_cast<LaneOf<Scorer>>(row_group));
 #pragma GCC unroll 2
   for (std::size_t v = 0; v < kVectorsPerBlock; ++v) {
@@ -319,64 +421,12 @@ HWY_INLINE void update_columns(const Tile<Scorer>& tile, std::size_t row_group, 
   }
 }
 
-std::int32_t similarity_of(DescriptorMetric metric,
-                           const std::uint8_t* HWY_RESTRICT a,
-                           const std::uint8_t* HWY_RESTRICT b,
-                           std::size_t count) {
-  std::int32_t sum = 0;
-  std::size_t i = 0;
-  if (metric == DescriptorMetric::kDotProduct) {
-    // Bytes below 128 are the same signed.
-    const hn::Rebind<std::int8_t, hn::ScalableTag<std::int16_t>> d8;
-    const D16 d16;
-    const D32 d32;
-    auto sum0 = hn::Zero(d32);
-    auto sum1 = hn::Zero(d32);
-    const auto* a_signed = reinterpret_cast<const std::int8_t*>(a);
-    const auto* b_signed = reinterpret_cast<const std::int8_t*>(b);
-    for (; i + hn::MaxLanes(d8) <= count; i += hn::MaxLanes(d8)) {
-      sum0 = hn::ReorderWidenMulAccumulate(d32,
-                                           hn::PromoteTo(d16, hn::LoadU(d8, a_signed + i)),
-                                           hn::PromoteTo(d16, hn::LoadU(d8, b_signed + i)),
-                                           sum0,
-                                           sum1);
-    }
-    sum = hn::GetLane(hn::SumOfLanes(d32, hn::Add(sum0, sum1)));
-    for (; i < count; ++i) {
-      sum += std::int32_t{a[i]} * std::int32_t{b[i]};
-    }
-    return sum;
-  }
-  for (; i + 8 <= count; i += 8) {
-    std::uint64_t word_a = 0;
-    std::uint64_t word_b = 0;
-    std::memcpy(&word_a, a + i, 8);
-    std::memcpy(&word_b, b + i, 8);
-    sum += static_cast<std::int32_t>(hwy::PopCount(word_a ^ word_b));
-  }
-  for (; i < count; ++i) {
-    sum += static_cast<std::int32_t>(hwy::PopCount(static_cast<std::uint64_t>(a[i] ^ b[i])));
-  }
-  return static_cast<std::int32_t>(8 * count) - sum;
-}
-
-std::int32_t similarity_impl(const DescriptorRows& a, std::size_t i, const DescriptorRows& b, std::size_t j) {
-  return similarity_of(a.metric, a.row(i), b.row(j), a.descriptor_bytes);
-}
-
-void similarities_impl(const DescriptorRows& a,
-                       std::size_t i,
-                       const DescriptorRows& b,
-                       std::span<const std::uint32_t> candidates,
-                       std::int32_t* scores) {
-  for (std::size_t c = 0; c < candidates.size(); ++c) {
-    scores[c] = similarity_of(a.metric, a.row(i), b.row(candidates[c]), a.descriptor_bytes);
-  }
-}
-
 /// The two best over all lanes of a row, with the lowest position among equals.
 template <class Scorer>
-NearestTwo reduce_row(const LaneState<Scorer>& state, const DescriptorRows& a, std::size_t i, const DescriptorRows& b) {
+NearestTwo reduce_row(const LaneState<Scorer>& state,
+                      const DescriptorRows& a,
+                      std::size_t i,
+                      const DescriptorRows& b) {
   constexpr std::size_t kLaneCount = kLanes<Scorer>;
   LaneOf<Scorer> best = state.best[0];
   LaneOf<Scorer> second = state.second[0];
@@ -384,7 +434,8 @@ NearestTwo reduce_row(const LaneState<Scorer>& state, const DescriptorRows& a, s
     second = std::max({second, state.second[l], std::min(best, state.best[l])});
     best = std::max(best, state.best[l]);
   }
-  NearestTwo out{.best = std::int32_t{best} - Scorer::kBias, .second = std::int32_t{second} - Scorer::kBias};
+  NearestTwo out{.best = std::int32_t{best} - Scorer::kBias,
+                 .second = std::int32_t{second} - Scorer::kBias};
   if (out.best == 0) {
     return out;
   }
@@ -443,7 +494,8 @@ ScanResult scan_for(const DescriptorRows& a,
           clear_outside<Scorer>(rows - r, lanes, tile);
         }
         update_rows<Scorer>(tile, block, &row_states[r]);
-        update_columns<Scorer>(tile, (first + r) / kRowsPerGroup, &column_states[block * kVectorsPerBlock]);
+        update_columns<Scorer>(
+            tile, (first + r) / kRowsPerGroup, &column_states[block * kVectorsPerBlock]);
       }
     }
     for (std::size_t r = 0; r < rows; ++r) {
@@ -461,6 +513,12 @@ ScanResult scan_for(const DescriptorRows& a,
   return out;
 }
 
+#if HWY_TARGET == HWY_AVX3_DL
+using DotProduct = DotProduct32;
+#else
+using DotProduct = DotProduct16;
+#endif
+
 InterleavedRows interleave_impl(const DescriptorRows& rows) {
   return rows.metric == DescriptorMetric::kDotProduct ? interleave_for<DotProduct>(rows)
                                                       : interleave_for<HammingDistance>(rows);
@@ -476,6 +534,43 @@ ScanResult scan_impl(const DescriptorRows& a,
              : scan_for<HammingDistance>(a, count_a, b, b_interleaved, count_b);
 }
 
+#else  // HWY_TARGET == HWY_SCALAR: machines without any vector unit that Highway knows
+
+InterleavedRows interleave_impl(const DescriptorRows& /*rows*/) {
+  return {};
+}
+
+void take_in(std::int32_t score, std::size_t position, NearestTwo& nearest) {
+  if (score > nearest.best) {
+    nearest = {
+        .best = score, .second = nearest.best, .position = static_cast<std::uint32_t>(position)};
+  } else {
+    nearest.second = std::max(nearest.second, score);
+  }
+}
+
+ScanResult scan_impl(const DescriptorRows& a,
+                     std::size_t count_a,
+                     const DescriptorRows& b,
+                     const InterleavedRows& /*b_interleaved*/,
+                     std::size_t count_b) {
+  ScanResult out;
+  out.rows.resize(count_a);
+  out.columns.resize(count_b);
+  out.ceiling = std::numeric_limits<std::int32_t>::max();
+  for (std::size_t i = 0; i < count_a; ++i) {
+    for (std::size_t j = 0; j < count_b; ++j) {
+      const std::int32_t score = similarity_impl(a, i, b, j);
+      take_in(score, j, out.rows[i]);
+      take_in(score, i, out.columns[j]);
+    }
+  }
+  return out;
+}
+
+#endif  // HWY_TARGET != HWY_SCALAR
+
+}  // namespace
 }  // namespace HWY_NAMESPACE
 }  // namespace trigmesh::internal
 
@@ -490,7 +585,10 @@ HWY_EXPORT(similarities_impl);
 HWY_EXPORT(interleave_impl);
 HWY_EXPORT(scan_impl);
 
-std::int32_t similarity(const DescriptorRows& a, std::size_t i, const DescriptorRows& b, std::size_t j) {
+std::int32_t similarity(const DescriptorRows& a,
+                        std::size_t i,
+                        const DescriptorRows& b,
+                        std::size_t j) {
   return HWY_DYNAMIC_DISPATCH(similarity_impl)(a, i, b, j);
 }
 
@@ -502,7 +600,9 @@ void similarities(const DescriptorRows& a,
   HWY_DYNAMIC_DISPATCH(similarities_impl)(a, i, b, candidates, scores);
 }
 
-InterleavedRows interleave(const DescriptorRows& rows) { return HWY_DYNAMIC_DISPATCH(interleave_impl)(rows); }
+InterleavedRows interleave(const DescriptorRows& rows) {
+  return HWY_DYNAMIC_DISPATCH(interleave_impl)(rows);
+}
 
 ScanResult scan_all_pairs(const DescriptorRows& a,
                           std::size_t count_a,

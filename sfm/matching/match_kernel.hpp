@@ -1,6 +1,7 @@
 #pragma once
 
-// Inside of the descriptor matcher: the loops over all pairs, in the best instruction set of the machine (Highway).
+// Inside of the descriptor matcher: the loops over all pairs, in the best instruction set of the
+// machine (Highway).
 
 #include <cstddef>
 #include <cstdint>
@@ -26,9 +27,10 @@ struct DescriptorRows {
   [[nodiscard]] const std::uint8_t* row(std::size_t i) const { return data + i * descriptor_bytes; }
 };
 
-/// The same descriptors, interleaved so that each lane of a vector holds another descriptor: a block of descriptors is
-/// `steps` pairs of vectors, and lane l of step s holds bytes s * w .. s * w + w - 1 of descriptor l (w = 2 or 4). The layout
-/// depends on the instruction set that was chosen at run time.
+/// The same descriptors, interleaved so that each lane of a vector holds another descriptor: a
+/// block of descriptors is `steps` pairs of vectors, and lane l of step s holds bytes s * w .. s *
+/// w + w - 1 of descriptor l (w = 2 or 4). The layout depends on the instruction set that was
+/// chosen at run time.
 struct InterleavedRows {
   std::size_t descriptors_per_block = 0;
   std::size_t bytes_per_block = 0;
@@ -36,9 +38,13 @@ struct InterleavedRows {
 };
 
 /// Similarity of two descriptors: the dot product, or the number of equal bits. Larger is nearer.
-[[nodiscard]] std::int32_t similarity(const DescriptorRows& a, std::size_t i, const DescriptorRows& b, std::size_t j);
+[[nodiscard]] std::int32_t similarity(const DescriptorRows& a,
+                                      std::size_t i,
+                                      const DescriptorRows& b,
+                                      std::size_t j);
 
-/// Similarity of descriptor `i` of a to each of `candidates` in b, written to `scores` (same length).
+/// Similarity of descriptor `i` of a to each of `candidates` in b, written to `scores` (same
+/// length).
 void similarities(const DescriptorRows& a,
                   std::size_t i,
                   const DescriptorRows& b,
@@ -47,7 +53,8 @@ void similarities(const DescriptorRows& a,
 
 [[nodiscard]] InterleavedRows interleave(const DescriptorRows& rows);
 
-/// The nearest neighbour and the similarity of the two nearest. No neighbour: both similarities are 0.
+/// The nearest neighbour and the similarity of the two nearest. No neighbour: both similarities are
+/// 0.
 struct NearestTwo {
   std::int32_t best = 0;
   std::int32_t second = 0;
@@ -64,7 +71,8 @@ struct ScanResult {
   std::int32_t ceiling = 0;
 };
 
-/// Compares the first `count_a` rows of a with the first `count_b` of b. `b_interleaved` belongs to b.
+/// Compares the first `count_a` rows of a with the first `count_b` of b. `b_interleaved` belongs to
+/// b.
 [[nodiscard]] ScanResult scan_all_pairs(const DescriptorRows& a,
                                         std::size_t count_a,
                                         const DescriptorRows& b,

@@ -37,8 +37,8 @@ struct TwoViewGeometry {
   /// second^T F first = 0 in undistorted homogeneous pixels.
   Eigen::Matrix3d fundamental = Eigen::Matrix3d::Zero();
   std::vector<FeatureMatch> inliers;
-  std::size_t candidates = 0;           ///< putative matches before verification
-  std::size_t homography_inliers = 0;   ///< how many matches one homography explains
+  std::size_t candidates = 0;          ///< putative matches before verification
+  std::size_t homography_inliers = 0;  ///< how many matches one homography explains
 };
 
 /// A pair of images by their position in the input, first < second.
