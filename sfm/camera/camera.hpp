@@ -10,7 +10,8 @@
 
 namespace trigmesh {
 
-/// How a ray becomes a pixel. Coordinates: camera looks along +z, x right, y down; (u, v) = (x/z, y/z).
+/// How a ray becomes a pixel. Coordinates: camera looks along +z, x right, y down; (u, v) = (x/z,
+/// y/z).
 enum class CameraModel {
   kPinhole,        ///< no distortion
   kRadial,         ///< u (1 + k1 r^2 + k2 r^4)                       distortion = k1 k2 0 0
@@ -22,7 +23,8 @@ enum class CameraModel {
 inline constexpr int kIntrinsicsCount = 8;
 using IntrinsicsVector = Eigen::Matrix<double, kIntrinsicsCount, 1>;
 
-/// One camera with its lens. Pixels: the centre of the first pixel is (0, 0), x right, y down, as in OpenCV.
+/// One camera with its lens. Pixels: the centre of the first pixel is (0, 0), x right, y down, as
+/// in OpenCV.
 struct Camera {
   CameraModel model = CameraModel::kPinhole;
   int width_px = 0;
@@ -50,9 +52,10 @@ struct Camera {
 [[nodiscard]] std::string_view to_string(CameraModel model);
 [[nodiscard]] std::optional<CameraModel> camera_model_from_string(std::string_view name);
 
-/// Pixel of a point given in the camera frame; nothing when the point is behind the camera (z <= 0; for the
-/// fisheye: at the centre) or the projection is not finite.
-[[nodiscard]] std::optional<Eigen::Vector2d> project(const Camera& camera, const Eigen::Vector3d& point_in_cam);
+/// Pixel of a point given in the camera frame; nothing when the point is behind the camera (z <= 0;
+/// for the fisheye: at the centre) or the projection is not finite.
+[[nodiscard]] std::optional<Eigen::Vector2d> project(const Camera& camera,
+                                                     const Eigen::Vector3d& point_in_cam);
 
 /// Pixel with its derivatives, for bundle adjustment.
 struct ProjectionDerivatives {
@@ -60,12 +63,14 @@ struct ProjectionDerivatives {
   Eigen::Matrix<double, 2, 3> d_point;                      ///< by the point in the camera frame
   Eigen::Matrix<double, 2, kIntrinsicsCount> d_intrinsics;  ///< by fx fy cx cy d0 d1 d2 d3
 };
-[[nodiscard]] std::optional<ProjectionDerivatives> project_with_derivatives(const Camera& camera,
-                                                                            const Eigen::Vector3d& point_in_cam);
 
-/// Normalised image coordinates (x/z, y/z) of the ray through a pixel, distortion removed by Newton iteration.
-/// Nothing when the iteration does not converge (outside the invertible part of the lens model) or, for the fisheye, when
-/// the ray is 90 degrees or more off the axis.
-[[nodiscard]] std::optional<Eigen::Vector2d> normalize_pixel(const Camera& camera, const Eigen::Vector2d& pixel);
+[[nodiscard]] std::optional<ProjectionDerivatives> project_with_derivatives(
+    const Camera& camera, const Eigen::Vector3d& point_in_cam);
+
+/// Normalised image coordinates (x/z, y/z) of the ray through a pixel, distortion removed by Newton
+/// iteration. Nothing when the iteration does not converge (outside the invertible part of the lens
+/// model) or, for the fisheye, when the ray is 90 degrees or more off the axis.
+[[nodiscard]] std::optional<Eigen::Vector2d> normalize_pixel(const Camera& camera,
+                                                             const Eigen::Vector2d& pixel);
 
 }  // namespace trigmesh

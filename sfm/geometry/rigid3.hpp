@@ -1,16 +1,21 @@
 #pragma once
 
+#include <cmath>
+
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
 namespace trigmesh {
 
-/// Rigid motion between two frames. A value named `b_from_a` maps a point: point_in_b = b_from_a * point_in_a.
+/// Rigid motion between two frames. A value named `b_from_a` maps a point: point_in_b = b_from_a *
+/// point_in_a.
 struct Rigid3 {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  ///< unit, Hamilton
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
 
-  [[nodiscard]] Eigen::Vector3d operator*(const Eigen::Vector3d& point) const { return rotation * point + translation; }
+  [[nodiscard]] Eigen::Vector3d operator*(const Eigen::Vector3d& point) const {
+    return rotation * point + translation;
+  }
 
   /// c_from_b * b_from_a = c_from_a.
   [[nodiscard]] Rigid3 operator*(const Rigid3& other) const {
