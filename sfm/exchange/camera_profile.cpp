@@ -205,7 +205,7 @@ std::string quoted(const std::string& text) {
 
 /// The shortest text that reads back as the same double.
 std::string exact(double value) {
-  return fmt::format("{:#}", value);
+  return fmt::format("{}", value);
 }
 
 /// The camera list of COLMAP begins with a number, a profile with a key.

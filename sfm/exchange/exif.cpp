@@ -7,6 +7,7 @@
 #include "sfm/exchange/exif.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <memory>
@@ -97,22 +98,15 @@ class ExifTags {
 };
 
 /// Millimetres per FocalPlaneResolutionUnit; 0 when unknown.
-double millimetres_per_unit(double unit) {
-  constexpr double kInch = 25.4;
-  switch (static_cast<int>(unit)) {
-    case 0:  // absent: the default is the inch
-    case 1:  // "no unit", written by cameras that mean the inch
-    case 2:
-      return kInch;
-    case 3:
-      return 10.0;
-    case 4:
-      return 1.0;
-    case 5:
-      return 0.001;
-    default:
-      return 0.0;
+double millimetres_per_unit(double code) {
+  // 0: absent, the default is the inch; 1: "no unit", written by cameras that mean the inch.
+  constexpr std::array<double, 6> kMillimetres = {25.4, 25.4, 25.4, 10.0, 1.0, 0.001};
+  for (std::size_t i = 0; i < kMillimetres.size(); ++i) {
+    if (code == static_cast<double>(i)) {
+      return kMillimetres[i];
+    }
   }
+  return 0.0;
 }
 
 bool is_plausible(double focal_px, double long_side_px) {

@@ -152,6 +152,16 @@ TEST(Exif, IgnoresImpossibleFocalLengths) {
   EXPECT_FALSE(zero_denominator);
 }
 
+TEST(Exif, IgnoresAnUnknownResolutionUnit) {
+  ExifBuilder builder;
+  builder.ratio(EXIF_TAG_FOCAL_LENGTH, 35, 1).ratio(EXIF_TAG_FOCAL_PLANE_X_RESOLUTION, 4000, 1);
+  builder.ratio(
+      EXIF_TAG_FOCAL_PLANE_RESOLUTION_UNIT, 2'684'490'000, 1);  // found by fuzzing: beyond any int
+  const auto camera = read_exif_camera(builder.jpeg(), 6000, 4000);
+  ASSERT_TRUE(camera);
+  EXPECT_FALSE(camera->focal_px);
+}
+
 TEST(Exif, TellsCamerasApart) {
   const auto identity = [](const char* model, const char* serial) {
     return read_exif_camera(ExifBuilder()
