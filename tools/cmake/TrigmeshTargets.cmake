@@ -43,6 +43,20 @@ function(trigmesh_add_library)
   endif()
 endfunction()
 
+# Names of tests tell the sanitizer, so that several builds can be run as one (tests/suites.cmake).
+set(threads_folder "${CMAKE_SOURCE_DIR}/tests/unit/firmware")
+set(test_prefix "")
+if(TRIGMESH_SANITIZE MATCHES "address")
+  set(test_prefix "asan.")
+elseif(TRIGMESH_SANITIZE MATCHES "thread")
+  set(test_prefix "tsan.")
+endif()
+
+# What tools/run-tests builds with sanitizers: parts of the tests only.
+add_custom_target(trigmesh_unit_tests)
+add_custom_target(trigmesh_thread_tests)
+add_custom_target(trigmesh_fuzzers)
+
 # trigmesh_add_test(NAME unit_sfm_camera SOURCES .. LIBRARIES .. LABEL unit [TIMEOUT 60])
 # A GoogleTest program; every TEST in it becomes a ctest entry with the label and time-out.
 function(trigmesh_add_test)
@@ -55,7 +69,14 @@ function(trigmesh_add_test)
   endif()
   add_executable(${ARG_NAME} ${ARG_SOURCES})
   target_link_libraries(${ARG_NAME} PRIVATE ${ARG_LIBRARIES} GTest::gmock GTest::gtest_main trigmesh_compile_options)
-  gtest_discover_tests(${ARG_NAME} DISCOVERY_MODE PRE_TEST
+  if("${ARG_LABEL}" STREQUAL "unit")
+    add_dependencies(trigmesh_unit_tests ${ARG_NAME})
+    cmake_path(IS_PREFIX threads_folder "${CMAKE_CURRENT_SOURCE_DIR}" has_threads)
+    if(has_threads)
+      add_dependencies(trigmesh_thread_tests ${ARG_NAME})
+    endif()
+  endif()
+  gtest_discover_tests(${ARG_NAME} DISCOVERY_MODE PRE_TEST TEST_PREFIX "${test_prefix}"
                        PROPERTIES LABELS "${ARG_LABEL}" TIMEOUT ${ARG_TIMEOUT})
 endfunction()
 
@@ -80,6 +101,7 @@ function(trigmesh_add_fuzzer)
   add_executable(${ARG_NAME} ${ARG_SOURCES})
   target_link_libraries(${ARG_NAME} PRIVATE ${ARG_LIBRARIES} trigmesh_compile_options)
   target_link_options(${ARG_NAME} PRIVATE -fsanitize=fuzzer)
+  add_dependencies(trigmesh_fuzzers ${ARG_NAME})
   set(work "${CMAKE_CURRENT_BINARY_DIR}/${ARG_NAME}_corpus")
   file(MAKE_DIRECTORY "${work}")
   math(EXPR limit "${TRIGMESH_FUZZ_SECONDS} + 120")

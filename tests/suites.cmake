@@ -1,0 +1,17 @@
+# Joins the tests of several build folders into one ctest run with one summary:
+#   cmake -DROOT=. -P tests/suites.cmake && cd build/tests && ctest
+# A suite is the test folder of one build; names of tests carry the sanitizer, so that they stay apart.
+set(suites
+  release/tests            # all
+  fuzz/tests/unit          # unit tests, address and undefined sanitizers, clang
+  fuzz/tests/fuzz          # every fuzz target for TRIGMESH_FUZZ_SECONDS
+  tsan/tests/unit/firmware # threads
+)
+set(content "# Written by tests/suites.cmake.\n")
+foreach(suite IN LISTS suites)
+  if(NOT EXISTS "${ROOT}/build/${suite}/CTestTestfile.cmake")
+    message(FATAL_ERROR "build/${suite} is not configured; tools/run-tests does it")
+  endif()
+  string(APPEND content "subdirs(\"${ROOT}/build/${suite}\")\n")
+endforeach()
+file(WRITE "${ROOT}/build/tests/CTestTestfile.cmake" "${content}")
