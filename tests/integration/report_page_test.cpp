@@ -1,0 +1,189 @@
+// Opens report pages in a real browser without a window, from a file, with the network cut off, and
+// looks at what the page made of itself. Skipped, saying so, where Chromium is not installed
+// (apt-get install chromium).
+
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <sstream>
+#include <string>
+#include <string_view>
+
+#include <unistd.h>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "firmware/pipeline/report_html.hpp"
+#include "tests/support/synthetic_scene.hpp"
+
+namespace trigmesh {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+constexpr const char* kBrowser = "/usr/bin/chromium";
+
+std::size_t count_of(std::string_view text, std::string_view part) {
+  std::size_t count = 0;
+  for (std::size_t at = text.find(part); at != std::string_view::npos;
+       at = text.find(part, at + part.size())) {
+    ++count;
+  }
+  return count;
+}
+
+std::string read_text(const fs::path& path) {
+  std::ostringstream text;
+  text << std::ifstream(path).rdbuf();
+  return text.str();
+}
+
+/// What the browser made of a page.
+struct Visit {
+  std::string dom;  ///< the document after the page's script ran
+  std::string log;  ///< the browser's log with the page's console
+};
+
+class ReportPage : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!fs::exists(kBrowser)) {
+      GTEST_SKIP() << kBrowser
+                   << " is not installed (apt-get install chromium): the page was not looked at";
+    }
+    std::string pattern = (fs::temp_directory_path() / "trigmesh_page_XXXXXX").string();
+    ASSERT_NE(::mkdtemp(pattern.data()), nullptr);
+    folder_ = pattern;
+  }
+
+  void TearDown() override {
+    if (!folder_.empty()) {
+      std::error_code ignored;  // a browser process that ends late may still hold a file
+      fs::remove_all(folder_, ignored);
+    }
+  }
+
+  /// Opens the page with `fragment` behind its address ("#check").
+  Visit open(const std::string& html, const std::string& fragment) {
+    std::ofstream(folder_ / "report.html") << html;
+    const std::string command =
+        std::string(kBrowser) +
+        " --headless --no-sandbox --disable-gpu --disable-quic --no-first-run"
+        " --disable-background-networking --disable-component-update --disable-sync"
+        " --disable-dev-shm-usage --use-angle=swiftshader --enable-unsafe-swiftshader"
+        " --host-resolver-rules='MAP * ~NOTFOUND' --window-size=1280,900"
+        " --enable-logging=stderr --virtual-time-budget=3000 --user-data-dir='" +
+        (folder_ / "profile").string() + "' --dump-dom 'file://" +
+        (folder_ / "report.html").string() + fragment + "' > '" + (folder_ / "dom").string() +
+        "' 2> '" + (folder_ / "log").string() + "'";
+    EXPECT_EQ(std::system(command.c_str()), 0) << read_text(folder_ / "log");
+    return {.dom = read_text(folder_ / "dom"), .log = read_text(folder_ / "log")};
+  }
+
+  static void expect_sound(const Visit& visit) {
+    EXPECT_THAT(visit.dom, HasSubstr("data-ready=\"true\""));
+    EXPECT_THAT(visit.dom, HasSubstr("data-problems=\"0\""));
+    EXPECT_THAT(visit.dom, HasSubstr("data-requests=\"0\""));
+    EXPECT_THAT(visit.log, Not(HasSubstr("Uncaught")));
+    EXPECT_THAT(visit.log, Not(HasSubstr("Refused to")));
+    EXPECT_THAT(visit.log, Not(HasSubstr("ERR_")));
+  }
+
+  /// Pixels of the 3D view that are not empty, as the page counted them.
+  static long drawn_pixels(const Visit& visit) {
+    constexpr std::string_view kMark = "data-drawn=\"";
+    const std::size_t at = visit.dom.find(kMark);
+    return at == std::string::npos
+               ? -1
+               : std::strtol(visit.dom.c_str() + at + kMark.size(), nullptr, 10);
+  }
+
+ private:
+  fs::path folder_;
+};
+
+ImageOutcome outcome_named(std::string name) {
+  ImageOutcome outcome;
+  outcome.name = std::move(name);
+  return outcome;
+}
+
+/// A page of `scene` with one more image, refused, of a name that would love to be markup.
+std::string page_of(const test_support::SyntheticScene& scene) {
+  std::vector<ImageOutcome> images;
+  for (const View& view : scene.truth.views) {
+    images.push_back(outcome_named(view.name));
+  }
+  images.push_back(outcome_named(
+      "</script><script>document.body.dataset.hacked = 1</script><b id=\"hacked\">.jpg"));
+  images.back().reason = RefusalReason::kNoOverlap;
+  images.back().detail = "<img src=\"https://example.org/x.png\" onerror=\"alert(1)\">";
+  std::vector<PairEvidence> pairs;
+  for (const test_support::SyntheticPair& pair : scene.pairs) {
+    pairs.push_back({.pair = pair.pair,
+                     .kind = pair.geometry.kind,
+                     .candidates = pair.geometry.candidates,
+                     .inliers = pair.geometry.inliers.size()});
+  }
+  const std::span<const Scene> components(&scene.truth, 1);
+  ReportInput input;
+  input.components = components;
+  input.images = images;
+  input.pairs = pairs;
+  input.input_description = "synthetic arc";
+  return render_report_html(build_report(input), components);
+}
+
+TEST_F(ReportPage, DrawsAModel) {
+  const test_support::SyntheticScene scene = test_support::make_synthetic_scene({.noise_px = 0.3});
+  const Visit visit = open(page_of(scene), "#check");
+  expect_sound(visit);
+  EXPECT_GT(drawn_pixels(visit), 1000);
+  EXPECT_EQ(count_of(visit.dom, "<tr data-image="), scene.truth.views.size() + 1);
+  EXPECT_EQ(count_of(visit.dom, "<figure class=\"plot\">"), 3U);
+  EXPECT_THAT(visit.dom, HasSubstr("10 of 11 images are registered, 1 is refused."));
+}
+
+TEST_F(ReportPage, DrawsAModelWithoutWebgl) {
+  const test_support::SyntheticScene scene = test_support::make_synthetic_scene({.noise_px = 0.3});
+  const Visit visit = open(page_of(scene), "#2d-check");
+  expect_sound(visit);
+  EXPECT_THAT(visit.dom, HasSubstr("data-renderer=\"2d\""));
+  EXPECT_GT(drawn_pixels(visit), 1000);
+}
+
+TEST_F(ReportPage, ShowsHostileNamesAsText) {
+  const Visit visit = open(page_of(test_support::make_synthetic_scene({})), "");
+  expect_sound(visit);
+  EXPECT_THAT(visit.dom, Not(HasSubstr("data-hacked")));
+  EXPECT_THAT(visit.dom, Not(HasSubstr("<b id=\"hacked\">")));
+  EXPECT_THAT(visit.dom, HasSubstr("&lt;/script&gt;&lt;script&gt;document.body"));
+  EXPECT_THAT(visit.dom, HasSubstr("&lt;img src="));
+}
+
+TEST_F(ReportPage, SaysWhyThereIsNoModel) {
+  std::vector<ImageOutcome> images{outcome_named("only.jpg")};
+  images[0].reason = RefusalReason::kNoOverlap;
+  ReportInput input;
+  input.images = images;
+  const Visit visit = open(render_report_html(build_report(input), {}), "#check");
+  expect_sound(visit);
+  EXPECT_THAT(visit.dom, HasSubstr("one image is not enough"));
+  EXPECT_THAT(visit.dom, HasSubstr(std::string(advice(RefusalReason::kNoOverlap)).substr(0, 20)));
+  EXPECT_EQ(count_of(visit.dom, "<tr data-image="), 1U);
+}
+
+TEST_F(ReportPage, OpensWithoutAnyImage) {
+  const Visit visit = open(render_report_html(build_report({}), {}), "");
+  expect_sound(visit);
+  EXPECT_THAT(visit.dom, HasSubstr("there were no images"));
+}
+
+}  // namespace
+}  // namespace trigmesh
