@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "firmware/base/executor.hpp"
 #include "firmware/base/result.hpp"
 #include "sfm/camera/camera.hpp"
 #include "sfm/scene/ids.hpp"
@@ -29,6 +30,14 @@ enum class RobustLoss {
   kCauchy,  ///< s^2 log(1 + r^2/s^2): far outliers lose all pull
 };
 
+/// Which code solves. Both minimise the same cost; results differ by rounding and by the last step
+/// taken.
+enum class BundleSolver {
+  kAutomatic,  ///< kSchur up to `dense_views`, kCeres beyond
+  kSchur,      ///< our own: dense reduced system, several threads if the executor has them
+  kCeres,      ///< Ceres: reduced system dense up to `dense_views`, sparse beyond; one thread
+};
+
 /// What is solved of the intrinsics of one camera, and what was known before. fy follows fx in its
 /// present ratio.
 struct IntrinsicsFreedom {
@@ -50,6 +59,7 @@ struct IntrinsicsFreedom {
 
 /// Settings of one adjustment.
 struct BundleOptions {
+  BundleSolver solver = BundleSolver::kAutomatic;
   RobustLoss loss = RobustLoss::kSoftL1;
   /// Where the loss leaves the parabola, in pixels of an observation with sigma 1, > 0.
   double loss_scale_px = 1.0;
@@ -135,8 +145,15 @@ struct BundleReport {
 /// during the solution (the point moves behind the camera) weighs like an error of 1000 px that no
 /// small step changes.
 ///
-/// Deterministic, single thread. Precondition: `options.validate()`, indices in range, scene sides
-/// consistent.
+/// Deterministic: the same bits for every executor. Precondition: `options.validate()`, indices in
+/// range, scene sides consistent.
+[[nodiscard]] BundleReport adjust_bundle(Scene& scene,
+                                         const BundleSelection& selection,
+                                         const BundleOptions& options,
+                                         std::span<const std::vector<float>> sigmas_px,
+                                         Executor& executor);
+
+/// The same in the calling thread alone.
 [[nodiscard]] BundleReport adjust_bundle(Scene& scene,
                                          const BundleSelection& selection,
                                          const BundleOptions& options,

@@ -205,6 +205,20 @@ double BundleProblem::rmse_px() const {
   return observations.empty() ? 0.0 : std::sqrt(sum / static_cast<double>(observations.size()));
 }
 
+IntrinsicsPriorValue prior_of_entry(const IntrinsicsFreedom& freedom, int entry) {
+  switch (entry) {
+    case 0:
+      return {freedom.prior.fx_px, freedom.focal_sigma_ratio * freedom.prior.fx_px};
+    case 1:
+      return {freedom.prior.cx_px, freedom.principal_point_sigma_px};
+    case 2:
+      return {freedom.prior.cy_px, freedom.principal_point_sigma_px};
+    default:
+      return {freedom.prior.distortion[static_cast<std::size_t>(entry - 3)],
+              freedom.distortion_sigma};
+  }
+}
+
 BundleProblem build_bundle_problem(const Scene& scene,
                                    const BundleSelection& selection,
                                    const BundleOptions& options,

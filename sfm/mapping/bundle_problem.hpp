@@ -35,6 +35,14 @@ struct BundleProblem {
   [[nodiscard]] double rmse_px() const;
 };
 
+/// A Gaussian prior on one entry of IntrinsicsState; sigma 0: none.
+struct IntrinsicsPriorValue {
+  double mean = 0.0;
+  double sigma = 0.0;
+};
+
+[[nodiscard]] IntrinsicsPriorValue prior_of_entry(const IntrinsicsFreedom& freedom, int entry);
+
 /// Gathers the selection, leaves out what cannot be projected and fixes the gauge, as
 /// `adjust_bundle` documents.
 [[nodiscard]] BundleProblem build_bundle_problem(const Scene& scene,

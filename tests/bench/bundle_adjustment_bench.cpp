@@ -46,11 +46,13 @@ void run(benchmark::State& state,
   state.counters["rmse_px"] = report.final_rmse_px;
 }
 
-void global_pinhole(benchmark::State& state) {
+void global_pinhole(benchmark::State& state, BundleSolver solver) {
   const Scene scene = noisy_scene(static_cast<std::size_t>(state.range(0)),
                                   static_cast<std::size_t>(state.range(1)),
                                   CameraModel::kPinhole);
-  run(state, scene, select_everything(scene), {});
+  BundleOptions options;
+  options.solver = solver;
+  run(state, scene, select_everything(scene), options);
 }
 
 void global_brown_conrady(benchmark::State& state) {
@@ -82,11 +84,15 @@ void one_pose(benchmark::State& state) {
   run(state, scene, selection, {});
 }
 
-BENCHMARK(global_pinhole)
-    ->Args({10, 3000})
-    ->Args({25, 8000})
-    ->Args({100, 20000})
-    ->Args({150, 20000})
+void sizes(benchmark::internal::Benchmark* benchmark) {
+  benchmark->Args({10, 3000})->Args({25, 8000})->Args({100, 20000})->Args({200, 30000});
+}
+
+BENCHMARK_CAPTURE(global_pinhole, schur, BundleSolver::kSchur)
+    ->Apply(sizes)
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(global_pinhole, ceres, BundleSolver::kCeres)
+    ->Apply(sizes)
     ->Unit(benchmark::kMillisecond);
 BENCHMARK(global_brown_conrady)->Unit(benchmark::kMillisecond);
 BENCHMARK(global_free_intrinsics)->Unit(benchmark::kMillisecond);
