@@ -172,8 +172,7 @@ Result<std::string> read_file(const fs::path& path, std::size_t max_bytes) {
 }
 
 Result<> write_file_atomically(const fs::path& path, std::string_view bytes) {
-  const fs::path part =
-      path.parent_path() / fmt::format(".{}.part", path.filename().string());
+  const fs::path part = path.parent_path() / fmt::format(".{}.part", path.filename().string());
   int failed = write_new_file(part, bytes);
   if (failed == 0 && ::rename(part.c_str(), path.c_str()) != 0) {
     failed = errno;

@@ -1,0 +1,85 @@
+#include "sfm/exchange/model_folder.hpp"
+
+#include <filesystem>
+#include <string>
+
+#include <unistd.h>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "sfm/exchange/file_io.hpp"
+#include "tests/unit/sfm/exchange/example_scene.hpp"
+
+namespace trigmesh {
+namespace {
+
+namespace fs = std::filesystem;
+using test_support::example_scene;
+using test_support::expect_same_scene;
+using ::testing::HasSubstr;
+
+class ModelFolder : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::string pattern = (fs::temp_directory_path() / "trigmesh_model_XXXXXX").string();
+    ASSERT_NE(::mkdtemp(pattern.data()), nullptr);
+    folder_ = pattern;
+  }
+
+  void TearDown() override {
+    std::error_code ignored;
+    fs::remove_all(folder_, ignored);
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(ModelFolder, IsFoundFromEveryFolderAboveIt) {
+  const Scene scene = example_scene(CameraModel::kRadial, 3, 30);
+  ASSERT_TRUE(write_text_model(scene, folder_ / "model" / "sparse").has_value());
+  for (const fs::path& path : {folder_, folder_ / "model", folder_ / "model" / "sparse"}) {
+    const auto read = read_model(path);
+    ASSERT_TRUE(read.has_value()) << read.error().message;
+    expect_same_scene(*read, scene);
+  }
+}
+
+TEST_F(ModelFolder, IsReadInBinaryToo) {
+  const Scene scene = example_scene(CameraModel::kRadial, 3, 30);
+  ASSERT_TRUE(write_binary_model(scene, folder_ / "sparse" / "0").has_value());
+  const auto read = read_model(folder_);
+  ASSERT_TRUE(read.has_value()) << read.error().message;
+  expect_same_scene(*read, scene);
+  const auto poses = read_model_poses(folder_);
+  ASSERT_TRUE(poses.has_value()) << poses.error().message;
+  EXPECT_EQ(poses->size(), 3U);
+}
+
+TEST_F(ModelFolder, ThatIsMissingIsNotFound) {
+  const auto read = read_model(folder_);
+  ASSERT_FALSE(read.has_value());
+  EXPECT_EQ(read.error().code, ErrorCode::kNotFound);
+  EXPECT_THAT(read.error().message, HasSubstr(folder_.string()));
+}
+
+TEST_F(ModelFolder, IsNamedWhenAFileInItIsDamaged) {
+  ASSERT_TRUE(write_text_model(example_scene(CameraModel::kRadial, 3, 30), folder_).has_value());
+  ASSERT_TRUE(write_file_atomically(folder_ / "points3D.txt", "x\n").has_value());
+  const auto read = read_model(folder_);
+  ASSERT_FALSE(read.has_value());
+  EXPECT_EQ(read.error().code, ErrorCode::kCorruptData);
+  EXPECT_THAT(read.error().message, HasSubstr(folder_.string() + ": points3D.txt, line 1"));
+}
+
+TEST_F(ModelFolder, GivesPosesWithoutPoints) {
+  ASSERT_TRUE(
+      write_file_atomically(folder_ / "images.txt", "1 1 0 0 0 1 2 3 1 a.jpg\n\n").has_value());
+  const auto poses = read_model_poses(folder_);
+  ASSERT_TRUE(poses.has_value()) << poses.error().message;
+  EXPECT_EQ((*poses)[0].name, "a.jpg");
+  EXPECT_EQ(read_model(folder_).error().code, ErrorCode::kNotFound);
+}
+
+}  // namespace
+}  // namespace trigmesh
