@@ -83,7 +83,7 @@ function cameraRow(camera, severalComponents) {
     null,
     h('th', { scope: 'row' }, severalComponents ? `${camera.group + 1} in model ${camera.component + 1}` : `${camera.group + 1}`),
     h('td', { class: 'number' }, count(camera.images)),
-    h('td', null, `${camera.width_px} \u00d7 ${camera.height_px}`),
+    h('td', { class: 'size' }, `${camera.width_px} \u00d7 ${camera.height_px}`),
     h('td', { class: 'number' }, `${fixed(camera.fx_px, 1)} / ${fixed(camera.fy_px, 1)}`),
     h('td', { class: 'number' }, `${fixed(camera.cx_px, 1)} / ${fixed(camera.cy_px, 1)}`),
     h('td', { class: 'number' }, `${fixed(camera.focal_35mm_equivalent_mm, 1)} mm`),
