@@ -20,6 +20,10 @@ using FeatureExtractorResult = Result<std::unique_ptr<FeatureExtractor>>;
 /// least 16x16.
 [[nodiscard]] Result<> check_grey_image(const cv::Mat& grey);
 
+/// The order that FeatureExtractor::extract promises: coarsest first; ties by response, then y,
+/// then x (and by angle between two orientations of one point, so that the order is total).
+[[nodiscard]] bool comes_before(const Keypoint& a, const Keypoint& b);
+
 /// Brings keypoints into the order that FeatureExtractor::extract promises (coarsest first; ties by
 /// response, then y, then x) and moves their descriptor rows with them.
 void sort_features(FeatureSet& features);

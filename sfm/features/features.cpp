@@ -21,12 +21,6 @@ constexpr int kMinImageSide = 16;
 constexpr int kMinKeypoints = 16;
 constexpr int kMaxKeypoints = 100000;
 
-bool comes_before(const Keypoint& a, const Keypoint& b) {
-  // The angle decides between two orientations of one point, so that the order is total.
-  return std::tuple(-a.scale_px, -a.response, a.y_px, a.x_px, a.angle_rad) <
-         std::tuple(-b.scale_px, -b.response, b.y_px, b.x_px, b.angle_rad);
-}
-
 }  // namespace
 
 std::string_view to_string(FeatureKind kind) {
@@ -96,6 +90,11 @@ Result<> check_grey_image(const cv::Mat& grey) {
                 kMinImageSide);
   }
   return {};
+}
+
+bool comes_before(const Keypoint& a, const Keypoint& b) {
+  return std::tuple(-a.scale_px, -a.response, a.y_px, a.x_px, a.angle_rad) <
+         std::tuple(-b.scale_px, -b.response, b.y_px, b.x_px, b.angle_rad);
 }
 
 void sort_features(FeatureSet& features) {

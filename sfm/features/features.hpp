@@ -23,7 +23,8 @@ enum class FeatureKind { kSift, kSurf, kAkaze, kOrb };
 
 /// How two descriptors are compared.
 enum class DescriptorMetric {
-  kDotProduct,  ///< bytes 0..127, vectors of (nearly) equal length: a larger dot product is nearer (SIFT, SURF)
+  kDotProduct,  ///< bytes 0..127, vectors of (nearly) equal length: a larger dot product is nearer
+                ///< (SIFT, SURF)
   kHamming,     ///< bit strings: fewer differing bits are nearer (AKAZE, ORB)
 };
 
@@ -31,7 +32,8 @@ enum class DescriptorMetric {
 struct Keypoint {
   float x_px = 0.0F;
   float y_px = 0.0F;
-  float scale_px = 0.0F;   ///< sigma of the Gaussian at which it was found, in pixels of the input image
+  float scale_px =
+      0.0F;  ///< sigma of the Gaussian at which it was found, in pixels of the input image
   float angle_rad = 0.0F;  ///< orientation, x axis towards y axis; 0 when upright
   float response = 0.0F;   ///< strength; comparable only within one image and kind
 };
@@ -56,16 +58,18 @@ struct FeatureSet {
 struct FeatureOptions {
   /// Most keypoints kept in one image, [16, 100000]; they are spread over the image, not clustered.
   int max_keypoints = 8000;
-  /// Rotation-invariant descriptors; off ("upright") is faster and better when the camera is never rolled.
+  /// Rotation-invariant descriptors; off ("upright") is faster and better when the camera is never
+  /// rolled.
   bool oriented = true;
-  /// SIFT and SURF: start at twice the image size. Finds about four times as many points at four times the cost.
+  /// SIFT and SURF: start at twice the image size. Finds about four times as many points at four
+  /// times the cost.
   bool upsample = false;
 
   [[nodiscard]] Result<> validate() const;
 };
 
-/// Finds and describes keypoints in one grey image. Thread-safe: one extractor may serve several threads; deterministic:
-/// the same image gives the same bytes. Uses no thread of its own.
+/// Finds and describes keypoints in one grey image. Thread-safe: one extractor may serve several
+/// threads; deterministic: the same image gives the same bytes. Uses no thread of its own.
 class FeatureExtractor {
  public:
   FeatureExtractor() = default;
@@ -75,13 +79,14 @@ class FeatureExtractor {
   FeatureExtractor& operator=(FeatureExtractor&&) = delete;
   virtual ~FeatureExtractor() = default;
 
-  /// `grey`: CV_8UC1, at least 16x16. Keypoints come in descending order of scale (coarsest first), ties broken by
-  /// response, then y, then x. An image without texture gives an empty set, which is not an error.
+  /// `grey`: CV_8UC1, at least 16x16. Keypoints come in descending order of scale (coarsest first),
+  /// ties broken by response, then y, then x. An image without texture gives an empty set, which is
+  /// not an error.
   [[nodiscard]] virtual Result<FeatureSet> extract(const cv::Mat& grey) const = 0;
 };
 
 /// Makes the extractor of a kind; kInvalidArgument when the options are out of range.
-[[nodiscard]] Result<std::unique_ptr<FeatureExtractor>> create_feature_extractor(FeatureKind kind,
-                                                                                const FeatureOptions& options);
+[[nodiscard]] Result<std::unique_ptr<FeatureExtractor>> create_feature_extractor(
+    FeatureKind kind, const FeatureOptions& options);
 
 }  // namespace trigmesh
