@@ -58,26 +58,46 @@ using V8 = hn::Vec<D8>;
 using V16 = hn::Vec<D16>;
 using V32 = hn::Vec<D32>;
 
+/// Bytes below 128: the sum of two products in each 16-bit lane, at most 2 * 127^2.
+HWY_INLINE V16 multiply_bytes(V8 database, V8 query) {
+#if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX3_DL
+  return V16{_mm512_maddubs_epi16(database.raw, query.raw)};
+#elif HWY_TARGET == HWY_AVX2
+  return V16{_mm256_maddubs_epi16(database.raw, query.raw)};
+#elif HWY_TARGET == HWY_SSE4 || HWY_TARGET == HWY_SSSE3
+  return V16{_mm_maddubs_epi16(database.raw, query.raw)};
+#elif HWY_TARGET == HWY_NEON && HWY_ARCH_ARM_A64
+  const uint16x8_t low = vmull_u8(vget_low_u8(database.raw), vget_low_u8(query.raw));
+  const uint16x8_t high = vmull_high_u8(database.raw, query.raw);
+  return V16(vreinterpretq_s16_u16(vpaddq_u16(low, high)));
+#else
+  const D16 d;
+  const V16 low_byte = hn::Set(d, std::int16_t{0xFF});
+  const V16 words = hn::BitCast(d, database);
+  const V16 query_words = hn::BitCast(d, query);
+  const V16 even = hn::Mul(hn::And(words, low_byte), hn::And(query_words, low_byte));
+  const V16 odd = hn::Mul(hn::ShiftRight<8>(words), hn::ShiftRight<8>(query_words));
+  return hn::Add(even, odd);
+#endif
+}
+
 #endif  // HWY_TARGET != HWY_SCALAR
 
-/// Dot product of bytes below 128: those are the same signed.
-std::int32_t dot_product(const std::uint8_t* HWY_RESTRICT a,
-                         const std::uint8_t* HWY_RESTRICT b,
-                         std::size_t count) {
+/// Dot product of bytes below 128.
+HWY_INLINE std::int32_t dot_product(const std::uint8_t* HWY_RESTRICT a,
+                                    const std::uint8_t* HWY_RESTRICT b,
+                                    std::size_t count) {
   std::int32_t sum = 0;
   std::size_t i = 0;
 #if HWY_TARGET != HWY_SCALAR
-  const D16 d16;
+  const D8 d8;
   const D32 d32;
-  const hn::Rebind<std::int8_t, D16> d8;
+  const V16 ones = hn::Set(D16(), std::int16_t{1});
   auto sum0 = hn::Zero(d32);
   auto sum1 = hn::Zero(d32);
-  const auto* a_signed = reinterpret_cast<const std::int8_t*>(a);
-  const auto* b_signed = reinterpret_cast<const std::int8_t*>(b);
   for (; i + hn::MaxLanes(d8) <= count; i += hn::MaxLanes(d8)) {
-    const auto values_a = hn::PromoteTo(d16, hn::LoadU(d8, a_signed + i));
-    const auto values_b = hn::PromoteTo(d16, hn::LoadU(d8, b_signed + i));
-    sum0 = hn::ReorderWidenMulAccumulate(d32, values_a, values_b, sum0, sum1);
+    const V16 products = multiply_bytes(hn::LoadU(d8, a + i), hn::LoadU(d8, b + i));
+    sum0 = hn::ReorderWidenMulAccumulate(d32, products, ones, sum0, sum1);
   }
   sum = hn::GetLane(hn::SumOfLanes(d32, hn::Add(sum0, sum1)));
 #endif
@@ -119,8 +139,11 @@ void similarities_impl(const DescriptorRows& a,
                        const DescriptorRows& b,
                        std::span<const std::uint32_t> candidates,
                        std::int32_t* scores) {
+  const std::size_t bytes = a.descriptor_bytes;
   for (std::size_t c = 0; c < candidates.size(); ++c) {
-    scores[c] = similarity_impl(a, i, b, candidates[c]);
+    scores[c] = a.metric == DescriptorMetric::kDotProduct
+                    ? dot_product(a.row(i), b.row(candidates[c]), bytes)
+                    : equal_bits(a.row(i), b.row(candidates[c]), bytes);
   }
 }
 
@@ -134,35 +157,12 @@ struct DotProduct16 {
   static constexpr std::int32_t kCeiling = 65535;
   static constexpr std::size_t kStepsPerFlush = std::numeric_limits<std::size_t>::max();
 
-  /// Two products in each 16-bit lane, at most 2 * 127^2.
-  static HWY_INLINE V16 multiply(V8 database, V8 query) {
-#if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX3_DL
-    return V16{_mm512_maddubs_epi16(database.raw, query.raw)};
-#elif HWY_TARGET == HWY_AVX2
-    return V16{_mm256_maddubs_epi16(database.raw, query.raw)};
-#elif HWY_TARGET == HWY_SSE4 || HWY_TARGET == HWY_SSSE3
-    return V16{_mm_maddubs_epi16(database.raw, query.raw)};
-#elif HWY_TARGET == HWY_NEON && HWY_ARCH_ARM_A64
-    const uint16x8_t low = vmull_u8(vget_low_u8(database.raw), vget_low_u8(query.raw));
-    const uint16x8_t high = vmull_high_u8(database.raw, query.raw);
-    return V16(vreinterpretq_s16_u16(vpaddq_u16(low, high)));
-#else
-    const D16 d;
-    const V16 low_byte = hn::Set(d, std::int16_t{0xFF});
-    const V16 words = hn::BitCast(d, database);
-    const V16 query_words = hn::BitCast(d, query);
-    const V16 even = hn::Mul(hn::And(words, low_byte), hn::And(query_words, low_byte));
-    const V16 odd = hn::Mul(hn::ShiftRight<8>(words), hn::ShiftRight<8>(query_words));
-    return hn::Add(even, odd);
-#endif
-  }
-
   /// Four products fit an unsigned lane (64516), so only every second addition must saturate; on
   /// Intel those run on fewer ports.
   static HWY_INLINE V16 accumulate(V16 sum, V8 database0, V8 query0, V8 database1, V8 query1) {
     const DU16 d;
-    const auto four =
-        hn::BitCast(d, hn::Add(multiply(database0, query0), multiply(database1, query1)));
+    const auto four = hn::BitCast(
+        d, hn::Add(multiply_bytes(database0, query0), multiply_bytes(database1, query1)));
     return hn::BitCast(D16(), hn::SaturatedAdd(hn::BitCast(d, sum), four));
   }
 

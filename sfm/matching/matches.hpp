@@ -39,6 +39,8 @@ struct TwoViewGeometry {
   std::vector<FeatureMatch> inliers;
   std::size_t candidates = 0;          ///< putative matches before verification
   std::size_t homography_inliers = 0;  ///< how many matches one homography explains
+  /// second ~ homography * first, for those matches; zero when none was found.
+  Eigen::Matrix3d homography = Eigen::Matrix3d::Zero();
 };
 
 /// A pair of images by their position in the input, first < second.
