@@ -20,7 +20,6 @@ using pose_search::kMinPoints;
 using pose_search::kSampleSize;
 using pose_search::Matches;
 using pose_search::Rays;
-using pose_search::Score;
 
 }  // namespace
 

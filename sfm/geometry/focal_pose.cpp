@@ -21,7 +21,6 @@ using pose_search::kMinPoints;
 using pose_search::kSampleSize;
 using pose_search::Matches;
 using pose_search::Rays;
-using pose_search::Score;
 
 /// One focal length of the grid, with the rays that it gives to the pixels.
 struct GridCamera {

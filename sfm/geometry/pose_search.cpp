@@ -1,12 +1,8 @@
-// Scoring stops early by Wald's sequential test: with e the part of inliers of a good pose and d
-// that of a wrong one, the ratio of likelihoods of "wrong" to "good" is multiplied by d / e at each
-// inlier and (1 - d) / (1 - e) at each outlier; the pose is given up when it exceeds a limit A,
-// which loses a good one with probability 1 / A (J. Matas, O. Chum, "Randomized RANSAC with
-// Sequential Probability Ratio Test", ICCV 2005, equation 2).
 #include "sfm/geometry/pose_search.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace trigmesh::pose_search {
 
@@ -33,43 +29,17 @@ double Matches::squared_error(const PosedCamera& posed,
 }
 
 Score Matches::score(const PosedCamera& posed, double max_error_px, const Score& best) const {
-  constexpr double kChance = 0.02;        // part of the matches that agrees with a wrong pose
-  constexpr double kLeastInliers = 0.08;  // the test stays patient at high outlier rates
-  constexpr double kDecision = 200.0;     // one right pose in so many is lost
-  const double expected =
-      std::max(kLeastInliers, static_cast<double>(best.inliers) / static_cast<double>(size()));
-  const double inlier_factor = kChance / expected;
-  const double outlier_factor = (1.0 - kChance) / (1.0 - std::min(expected, 0.95));
-  const double limit = max_error_px * max_error_px;
   const Eigen::Matrix3d rotation = posed.cam_from_world.rotation.toRotationMatrix();
-  Score out{.cost = 0.0};
-  double likelihood_ratio = 1.0;
-  for (const std::uint32_t i : order_) {
-    const double error = squared_error(posed, rotation, i);
-    const bool inlier = error <= limit;
-    out.cost += inlier ? error : limit;
-    out.inliers += inlier ? 1 : 0;
-    likelihood_ratio *= inlier ? inlier_factor : outlier_factor;
-    if (out.cost >= best.cost || likelihood_ratio > kDecision) {
-      return {};
-    }
-  }
-  return out;
+  return score_sequentially(
+      order_, max_error_px, best, [&](std::size_t i) { return squared_error(posed, rotation, i); });
 }
 
 Score Matches::mark(const PosedCamera& posed,
                     double max_error_px,
                     std::span<std::uint8_t> mask) const {
-  const double limit = max_error_px * max_error_px;
   const Eigen::Matrix3d rotation = posed.cam_from_world.rotation.toRotationMatrix();
-  Score out{.cost = 0.0};
-  for (std::size_t i = 0; i < size(); ++i) {
-    const double error = squared_error(posed, rotation, i);
-    mask[i] = error <= limit ? 1 : 0;
-    out.inliers += mask[i];
-    out.cost += std::min(error, limit);
-  }
-  return out;
+  return mark_inliers(
+      mask, max_error_px, [&](std::size_t i) { return squared_error(posed, rotation, i); });
 }
 
 Candidate improve(const Matches& matches, const PosedCamera& start, const ImproveOptions& options) {

@@ -5,7 +5,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <span>
 #include <vector>
 
@@ -15,6 +14,7 @@
 #include "sfm/geometry/absolute_pose.hpp"
 #include "sfm/geometry/p3p.hpp"
 #include "sfm/geometry/pose_refinement.hpp"
+#include "sfm/geometry/robust_score.hpp"
 #include "sfm/geometry/sampling.hpp"
 
 namespace trigmesh::pose_search {
@@ -22,12 +22,6 @@ namespace trigmesh::pose_search {
 inline constexpr std::size_t kSampleSize = 3;
 /// Three matches give up to four poses and nothing to choose between them.
 inline constexpr std::size_t kMinPoints = 4;
-
-/// Truncated squared errors and how many matches agree.
-struct Score {
-  double cost = std::numeric_limits<double>::infinity();
-  std::size_t inliers = 0;
-};
 
 /// The matches of one estimation, in a fixed random order for the sequential test.
 class Matches {
@@ -48,7 +42,9 @@ class Matches {
   [[nodiscard]] Score score(const PosedCamera& posed, double max_error_px, const Score& best) const;
 
   /// Marks who agrees, `mask[i]` for match i, without any shortcut.
-  Score mark(const PosedCamera& posed, double max_error_px, std::span<std::uint8_t> mask) const;
+  [[nodiscard]] Score mark(const PosedCamera& posed,
+                           double max_error_px,
+                           std::span<std::uint8_t> mask) const;
 
  private:
   [[nodiscard]] double squared_error(const PosedCamera& posed,
