@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
-#include <cstring>
 #include <filesystem>
 #include <memory>
 #include <string_view>
@@ -50,13 +49,19 @@ struct FileCloser {
   }
   const std::unique_ptr<std::FILE, internal::FileCloser> file(std::fopen(path.c_str(), "rbe"));
   if (file == nullptr) {
-    return fail(ErrorCode::kIo, "cannot open {}: {}", path.string(), std::strerror(errno));
+    return fail(ErrorCode::kIo,
+                "cannot open {}: {}",
+                path.string(),
+                std::generic_category().message(errno));
   }
   // One byte more than expected, to notice a file that grows while it is read.
   std::vector<std::uint8_t> bytes((error ? max_bytes : static_cast<std::size_t>(size)) + 1);
   const std::size_t count = std::fread(bytes.data(), 1, bytes.size(), file.get());
   if (std::ferror(file.get()) != 0) {
-    return fail(ErrorCode::kIo, "cannot read {}: {}", path.string(), std::strerror(errno));
+    return fail(ErrorCode::kIo,
+                "cannot read {}: {}",
+                path.string(),
+                std::generic_category().message(errno));
   }
   if (count == bytes.size()) {
     return fail(ErrorCode::kIo, "cannot read {}: it grew while it was read", path.string());
