@@ -13,7 +13,8 @@
 #include <toml++/toml.h>
 
 #include "firmware/base/check.hpp"
-#include "firmware/base/file_bytes.hpp"
+#include "sfm/exchange/colmap_text.hpp"
+#include "sfm/exchange/file_io.hpp"
 
 namespace trigmesh {
 namespace {
@@ -221,6 +222,19 @@ bool looks_like_colmap(std::string_view text) {
   return false;
 }
 
+Result<std::vector<CameraProfile>> profiles_from_colmap(std::string_view text,
+                                                        std::string_view file) {
+  const Result<std::vector<ColmapCamera>> cameras = read_colmap_cameras(text);
+  if (!cameras) {
+    return fail(cameras.error().code, "{}: {}", file, cameras.error().message);
+  }
+  std::vector<CameraProfile> profiles;
+  for (const auto& [id, camera] : *cameras) {
+    profiles.push_back({camera, fmt::format("camera {}", id), {}, std::nullopt});
+  }
+  return profiles;
+}
+
 }  // namespace
 
 Result<CameraProfile> parse_camera_profile(std::string_view text, std::string_view file) {
@@ -272,16 +286,15 @@ Result<std::string> format_camera_profile(const CameraProfile& profile) {
 
 Result<std::vector<CameraProfile>> parse_camera_file(std::string_view text, std::string_view file) {
   if (looks_like_colmap(text)) {
-    return fail(ErrorCode::kUnsupported, "{}: COLMAP camera lists are not read yet", file);
+    return profiles_from_colmap(text, file);
   }
   TM_ASSIGN_OR_RETURN(CameraProfile profile, parse_camera_profile(text, file));
   return std::vector<CameraProfile>{std::move(profile)};
 }
 
 Result<std::vector<CameraProfile>> read_camera_file(const std::filesystem::path& path) {
-  TM_ASSIGN_OR_RETURN(const std::vector<std::uint8_t> bytes,
-                      read_file_bytes(path, kMaxCameraFileBytes));
-  return parse_camera_file(as_text(bytes), path.string());
+  TM_ASSIGN_OR_RETURN(const std::string text, read_file(path, kMaxCameraFileBytes));
+  return parse_camera_file(text, path.string());
 }
 
 }  // namespace trigmesh

@@ -1,6 +1,6 @@
 #include "sfm/exchange/camera_profile.hpp"
 
-#include <limits>
+#include <array>
 #include <string>
 #include <vector>
 
@@ -135,6 +135,31 @@ TEST(CameraFile, TakesAProfile) {
   ASSERT_TRUE(profiles) << profiles.error().message;
   ASSERT_EQ(profiles->size(), 1U);
   EXPECT_EQ(profiles->front().name, "left");
+}
+
+TEST(CameraFile, TakesEveryCameraOfAColmapList) {
+  const auto profiles = parse_camera_file(
+      "# list\n7 PINHOLE 640 480 500 510 320 240\n9 OPENCV 64 48 50 50 32 24 0.1 0.2 0.3 0.4\n",
+      "cameras.txt");
+  ASSERT_TRUE(profiles) << profiles.error().message;
+  ASSERT_EQ(profiles->size(), 2U);
+  EXPECT_EQ((*profiles)[0].camera,
+            (Camera{CameraModel::kPinhole, 640, 480, 500.0, 510.0, 319.5, 239.5, {}}));
+  EXPECT_EQ((*profiles)[1].camera.model, CameraModel::kBrownConrady);
+  EXPECT_EQ((*profiles)[1].camera.distortion, (std::array<double, 4>{0.1, 0.2, 0.3, 0.4}));
+}
+
+TEST(CameraFile, NamesTheFileOfABrokenColmapList) {
+  const auto profiles = parse_camera_file("1 PINHOLE 640 480 wide\n", "cameras.txt");
+  ASSERT_FALSE(profiles);
+  EXPECT_EQ(profiles.error().code, ErrorCode::kCorruptData);
+  EXPECT_THAT(profiles.error().message, HasSubstr("cameras.txt"));
+}
+
+TEST(CameraFile, RefusesAnEmptyFile) {
+  EXPECT_EQ(parse_camera_file("", "cameras.txt").error().code, ErrorCode::kCorruptData);
+  EXPECT_EQ(parse_camera_file("# only a comment\n", "cameras.txt").error().code,
+            ErrorCode::kCorruptData);
 }
 
 TEST(CameraFile, SaysWhichFileIsMissing) {
