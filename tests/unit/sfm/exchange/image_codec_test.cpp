@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdlib>
 #include <string>
 #include <vector>
@@ -59,7 +60,7 @@ int largest_difference(const cv::Mat& a, const cv::Mat& b) {
 }
 
 int luma(int r, int g, int b) {
-  return static_cast<int>(0.299 * r + 0.587 * g + 0.114 * b + 0.5);
+  return static_cast<int>(std::lround(0.299 * r + 0.587 * g + 0.114 * b));
 }
 
 /// Encodes with any pixel format and flags of turbojpeg, for the kinds that the product does not
@@ -110,7 +111,7 @@ TEST(PngCodec, RoundTripsWithoutLoss) {
   const auto image = decode_image(*bytes);
   ASSERT_TRUE(image) << image.error().message;
   EXPECT_EQ(largest_difference(image->rgb, rgb), 0);
-  const cv::Vec3b pixel = rgb.at<cv::Vec3b>(20, 30);
+  const auto& pixel = rgb.at<cv::Vec3b>(20, 30);
   EXPECT_NEAR(image->grey.at<std::uint8_t>(20, 30), luma(pixel[0], pixel[1], pixel[2]), 1);
 }
 
@@ -196,7 +197,7 @@ TEST(JpegCodec, StaysCloseToTheOriginalInEveryMode) {
   EXPECT_LE(largest_difference(both->rgb, colour->rgb), 40);  // chroma is interpolated differently
   EXPECT_EQ(largest_difference(both->grey, grey->grey), 0);   // the luma plane is one and the same
   EXPECT_TRUE(both->grey.isContinuous());
-  const cv::Vec3b pixel = rgb.at<cv::Vec3b>(40, 20);
+  const auto& pixel = rgb.at<cv::Vec3b>(40, 20);
   EXPECT_NEAR(both->grey.at<std::uint8_t>(40, 20), luma(pixel[0], pixel[1], pixel[2]), 6);
 }
 
