@@ -2,36 +2,90 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 namespace trigmesh {
 namespace {
 
 constexpr std::size_t kBlock = SchurLayout::kBlock;
 constexpr std::size_t kMaxCameraBlocks = 2;
-/// Least diagonal that damping is taken from: a point that no observation sees any more stays where it is.
+/// Least diagonal that damping is taken from: a point that no observation sees any more stays where
+/// it is.
 constexpr double kMinDiagonal = 1e-12;
 
 double* block_at(std::vector<double>& blocks, std::size_t row, std::size_t column) {
   return blocks.data() + 36 * (row * (row + 1) / 2 + column);
 }
 
-/// out += a0^T b0 + a1^T b1, all rows of six.
-void add_outer2(
-    const double* a0, const double* a1, const double* b0, const double* b1, double* out) {
+// The kernels below take most of the time. Two lanes at once, written out: compilers do not find
+// them by themselves. Every processor has two lanes of double, so that the sums, and with them the
+// bits, are the same everywhere.
+using Lanes = double __attribute__((vector_size(16)));
+
+Lanes load(const double* from) {
+  Lanes lanes;
+  std::memcpy(&lanes, from, sizeof(lanes));
+  return lanes;
+}
+
+void store(const Lanes& lanes, double* to) {
+  std::memcpy(to, &lanes, sizeof(lanes));
+}
+
+/// out += a^T b, both two rows of six.
+void add_outer2(const double* a, const double* b, double* out) {
+  const std::array<Lanes, 3> b0 = {load(b), load(b + 2), load(b + 4)};
+  const std::array<Lanes, 3> b1 = {load(b + 6), load(b + 8), load(b + 10)};
   for (std::size_t i = 0; i < kBlock; ++i) {
-    for (std::size_t j = 0; j < kBlock; ++j) {
-      out[kBlock * i + j] += a0[i] * b0[j] + a1[i] * b1[j];
+    double* const row = out + kBlock * i;
+    const double a0 = a[i];
+    const double a1 = a[kBlock + i];
+    for (std::size_t j = 0; j < 3; ++j) {
+      store(load(row + 2 * j) + (a0 * b0[j] + a1 * b1[j]), row + 2 * j);
     }
   }
 }
 
 /// out -= a^T b, both three rows of six.
 void subtract_outer3(const double* a, const double* b, double* out) {
+  const std::array<Lanes, 3> b0 = {load(b), load(b + 2), load(b + 4)};
+  const std::array<Lanes, 3> b1 = {load(b + 6), load(b + 8), load(b + 10)};
+  const std::array<Lanes, 3> b2 = {load(b + 12), load(b + 14), load(b + 16)};
   for (std::size_t i = 0; i < kBlock; ++i) {
-    for (std::size_t j = 0; j < kBlock; ++j) {
-      out[kBlock * i + j] -=
-          a[i] * b[j] + a[kBlock + i] * b[kBlock + j] + a[2 * kBlock + i] * b[2 * kBlock + j];
+    double* const row = out + kBlock * i;
+    const double a0 = a[i];
+    const double a1 = a[kBlock + i];
+    const double a2 = a[2 * kBlock + i];
+    for (std::size_t j = 0; j < 3; ++j) {
+      store(load(row + 2 * j) - (a0 * b0[j] + a1 * b1[j] + a2 * b2[j]), row + 2 * j);
     }
+  }
+}
+
+/// W^T += B^T A: out three rows of six, `point` (B) two rows of three, a two rows of six.
+void add_coupling(const double* point, const double* a, double* out) {
+  for (std::size_t j = 0; j < kBlock; j += 2) {
+    const Lanes a0 = load(a + j);
+    const Lanes a1 = load(a + kBlock + j);
+    for (std::size_t i = 0; i < 3; ++i) {
+      double* const at = out + kBlock * i + j;
+      store(load(at) + (point[i] * a0 + point[3 + i] * a1), at);
+    }
+  }
+}
+
+/// W^T -> Z^T = L^-1 W^T, in place, three rows of six.
+void solve_coupling(const std::array<double, 6>& l, double* e) {
+  const double i0 = 1.0 / l[0];
+  const double i1 = 1.0 / l[2];
+  const double i2 = 1.0 / l[5];
+  for (std::size_t j = 0; j < kBlock; j += 2) {
+    const Lanes z0 = load(e + j) * i0;
+    const Lanes z1 = (load(e + kBlock + j) - l[1] * z0) * i1;
+    const Lanes z2 = (load(e + 2 * kBlock + j) - l[3] * z0 - l[4] * z1) * i2;
+    store(z0, e + j);
+    store(z1, e + kBlock + j);
+    store(z2, e + 2 * kBlock + j);
   }
 }
 
@@ -94,7 +148,7 @@ class PointEliminator {
       return;
     }
     for (std::size_t i = 0; i < entry_count; ++i) {
-      solve_entry(eliminated.factor, entries[i]);
+      solve_coupling(eliminated.factor, entries[i].data());
     }
     subtract_point(entries, entry_count, layout_.first_entry(point), eliminated.half_step);
   }
@@ -112,7 +166,7 @@ class PointEliminator {
     }
     if (pose_moves) {
       const double* a = row_.pose.data();
-      add_outer2(a, a + kBlock, a, a + kBlock, block_at(sums_.blocks, pose_block, pose_block));
+      add_outer2(a, a, block_at(sums_.blocks, pose_block, pose_block));
       add_block_terms(row_.pose, pose_block, entries + next_entry);
       ++next_entry;
     }
@@ -182,11 +236,7 @@ class PointEliminator {
       diagonal[i] += a0[i] * a0[i] + a1[i] * a1[i];
     }
     if (problem_.points_are_variable) {
-      for (std::size_t row = 0; row < 3; ++row) {
-        for (std::size_t i = 0; i < kBlock; ++i) {
-          (*entry)[kBlock * row + i] += row_.point[row] * a0[i] + row_.point[3 + row] * a1[i];
-        }
-      }
+      add_coupling(row_.point.data(), a0, entry->data());
     }
   }
 
@@ -199,12 +249,11 @@ class PointEliminator {
       const double* c = row_.camera[i].data();
       if (pose_block != SchurLayout::kHeld) {
         const double* a = row_.pose.data();
-        add_outer2(c, c + kBlock, a, a + kBlock, block_at(sums_.blocks, first + i, pose_block));
+        add_outer2(c, a, block_at(sums_.blocks, first + i, pose_block));
       }
       for (std::size_t j = 0; j <= i; ++j) {
         const double* other = row_.camera[j].data();
-        add_outer2(
-            c, c + kBlock, other, other + kBlock, block_at(sums_.blocks, first + i, first + j));
+        add_outer2(c, other, block_at(sums_.blocks, first + i, first + j));
       }
       add_block_terms(row_.camera[i], first + i, entries + i);
     }
@@ -231,21 +280,6 @@ class PointEliminator {
     h[1] = (gradient_[1] - l[1] * h[0]) / l[2];
     h[2] = (gradient_[2] - l[3] * h[0] - l[4] * h[1]) / l[5];
     return true;
-  }
-
-  /// W^T -> Z^T = L^-1 W^T.
-  static void solve_entry(const std::array<double, 6>& l, SchurEntry& entry) {
-    const double i0 = 1.0 / l[0];
-    const double i1 = 1.0 / l[2];
-    const double i2 = 1.0 / l[5];
-    double* const e = entry.data();
-    for (std::size_t i = 0; i < kBlock; ++i) {
-      const double z0 = e[i] * i0;
-      const double z1 = (e[kBlock + i] - l[1] * z0) * i1;
-      e[2 * kBlock + i] = (e[2 * kBlock + i] - l[3] * z0 - l[4] * z1) * i2;
-      e[i] = z0;
-      e[kBlock + i] = z1;
-    }
   }
 
   void subtract_point(const SchurEntry* entries,
