@@ -1,0 +1,53 @@
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace trigmesh::test_support {
+
+/// How a program ended.
+struct ProgramResult {
+  int exit_code = -1;  ///< 128 + the signal when one ended it; 127 when it could not be started
+  std::string out;
+  std::string err;
+};
+
+/// Runs a program found by path or in PATH with these arguments, nothing on stdin, in the current
+/// folder, and waits. It is killed (exit code 137) after the time limit. QT_QPA_PLATFORM=offscreen
+/// is set, for COLMAP.
+[[nodiscard]] ProgramResult run_program(const std::vector<std::string>& command,
+                                        std::chrono::seconds time_limit = std::chrono::seconds(60));
+
+/// Runs the built `trigmesh` as a user does: `run_trigmesh({"export", model, ...})`.
+[[nodiscard]] ProgramResult run_trigmesh(
+    std::vector<std::string> arguments, std::chrono::seconds time_limit = std::chrono::seconds(60));
+
+/// The built `trigmesh`, for tests that start it through another program.
+[[nodiscard]] std::string program_path();
+
+/// Where a program of this name is in PATH.
+[[nodiscard]] std::optional<std::filesystem::path> find_program(const std::string& name);
+
+/// A file of this repository, by its path from the root.
+[[nodiscard]] std::filesystem::path source_path(const std::filesystem::path& relative);
+
+/// A folder of its own for every test, removed afterwards.
+class ScratchTest : public ::testing::Test {
+ protected:
+  void SetUp() override;
+  void TearDown() override;
+
+  /// A path in the folder.
+  [[nodiscard]] std::string path(const std::string& relative) const {
+    return (folder_ / relative).string();
+  }
+
+  std::filesystem::path folder_;
+};
+
+}  // namespace trigmesh::test_support
