@@ -56,7 +56,8 @@ struct RelativePose {
 };
 
 /// Pose of the second camera relative to the first from matches of pixels (with distortion), any
-/// part of which may be wrong. Deterministic for a seed. first_pixels[i] matches second_pixels[i].
+/// part of which may be wrong. Deterministic for a seed. A scene of one plane has two motions that
+/// explain it exactly; either may be returned. first_pixels[i] matches second_pixels[i].
 [[nodiscard]] RelativePose estimate_relative_pose(const Camera& first_camera,
                                                   const Camera& second_camera,
                                                   std::span<const Eigen::Vector2d> first_pixels,
