@@ -71,7 +71,7 @@ struct BundleOptions {
   double parameter_tolerance = 1e-8;
   /// Up to this many variable views the reduced camera system is solved dense, beyond it sparse, >=
   /// 0.
-  int dense_views = 100;
+  int dense_views = 200;
   /// By CameraId; cameras beyond the end are fixed.
   std::vector<IntrinsicsFreedom> intrinsics;
 

@@ -1,26 +1,24 @@
 #include "sfm/mapping/bundle_adjustment.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstring>
-#include <functional>
+#include <cstddef>
 #include <vector>
 
-#include <Eigen/Geometry>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "sfm/mapping/bundle_problem.hpp"
-#include "sfm/mapping/reprojection_cost.hpp"
 #include "tests/support/matchers.hpp"
 #include "tests/support/random.hpp"
-#include "tests/support/synthetic_scene.hpp"
+#include "tests/unit/sfm/mapping/bundle_test_scenes.hpp"
 
 namespace trigmesh {
 namespace {
 
-using test_support::CloudKind;
+using bundle_test::least_squares;
+using bundle_test::lens;
+using bundle_test::make_truth;
+using bundle_test::same_bits;
 using test_support::compare_reconstruction;
 using test_support::make_synthetic_scene;
 using test_support::PathKind;
@@ -28,175 +26,6 @@ using test_support::perturbed;
 using test_support::ReconstructionNear;
 using test_support::SyntheticSceneOptions;
 using ::testing::Not;
-
-// The same bits, not only equal values.
-bool same_bits(const Rigid3& a, const Rigid3& b) {
-  return std::memcmp(a.rotation.coeffs().data(), b.rotation.coeffs().data(), 4 * sizeof(double)) ==
-             0 &&
-         std::memcmp(a.translation.data(), b.translation.data(), 3 * sizeof(double)) == 0;
-}
-
-Scene make_truth(SyntheticSceneOptions options = {}) {
-  options.cloud = CloudKind::kVolume;
-  return make_synthetic_scene(options).truth;
-}
-
-/// Keypoints exactly where the points project, within float.
-BundleOptions least_squares() {
-  BundleOptions options;
-  options.loss = RobustLoss::kNone;
-  options.function_tolerance = 1e-14;
-  options.parameter_tolerance = 1e-14;
-  return options;
-}
-
-Camera lens(CameraModel model) {
-  Camera camera = SyntheticSceneOptions{}.camera;
-  camera.model = model;
-  switch (model) {
-    case CameraModel::kPinhole:
-      break;
-    case CameraModel::kRadial:
-      camera.distortion = {-0.12, 0.03, 0.0, 0.0};
-      break;
-    case CameraModel::kBrownConrady:
-      camera.distortion = {-0.12, 0.03, 0.002, -0.001};
-      break;
-    case CameraModel::kKannalaBrandt:
-      camera.distortion = {0.03, -0.01, 0.004, -0.001};
-      break;
-  }
-  return camera;
-}
-
-// ---------------------------------------------------------------------------------------------------------------------
-// The residual against numeric derivatives, away from the base pose and for every lens.
-
-class Reprojection : public ::testing::TestWithParam<CameraModel> {
- protected:
-  Reprojection() {
-    pose_.base.rotation = Eigen::AngleAxisd(0.7, Eigen::Vector3d(0.2, -0.5, 0.8).normalized());
-    pose_.base.translation = {0.3, -0.2, 4.0};
-    pose_.parameters = {0.11, -0.23, 0.31, 0.05, -0.07, 0.3};
-    pose_.update();
-    point_ = {0.5, 0.4, -0.3};
-    observation_.pixel = {400.0F, 300.0F};
-    observation_.inverse_sigma = 0.5F;
-  }
-
-  static IntrinsicsState everything_free() {
-    IntrinsicsFreedom freedom;
-    freedom.focal = true;
-    freedom.principal_point = true;
-    freedom.distortion = 4;
-    return {lens(GetParam()), freedom};
-  }
-
-  [[nodiscard]] Eigen::Vector2d residual() const {
-    return evaluate_reprojection(pose_, intrinsics_, point_, observation_, {});
-  }
-
-  /// Central difference of the residual by one number that `update` makes effective.
-  template <typename Update>
-  Eigen::Vector2d slope(double& value, double step, const Update& update) {
-    const double at = value;
-    value = at + step;
-    update();
-    const Eigen::Vector2d high = residual();
-    value = at - step;
-    update();
-    const Eigen::Vector2d low = residual();
-    value = at;
-    update();
-    return (high - low) / (2.0 * step);
-  }
-
-  PoseState pose_;
-  IntrinsicsState intrinsics_ = everything_free();
-  Eigen::Vector3d point_;
-  BundleObservation observation_;
-};
-
-TEST_P(Reprojection, PoseDerivativesAgreeWithDifferences) {
-  PoseJacobian analytic;
-  ReprojectionJacobians wanted;
-  wanted.pose = analytic.data();
-  (void)evaluate_reprojection(pose_, intrinsics_, point_, observation_, wanted);
-  for (std::size_t i = 0; i < PoseState::kSize; ++i) {
-    const auto numeric = slope(pose_.parameters[i], 1e-6, [this] { pose_.update(); });
-    EXPECT_LT((analytic.col(static_cast<Eigen::Index>(i)) - numeric).norm(), 1e-5) << i;
-  }
-}
-
-TEST_P(Reprojection, PointDerivativesAgreeWithDifferences) {
-  PointJacobian analytic;
-  ReprojectionJacobians wanted;
-  wanted.point = analytic.data();
-  (void)evaluate_reprojection(pose_, intrinsics_, point_, observation_, wanted);
-  for (Eigen::Index i = 0; i < 3; ++i) {
-    const auto numeric = slope(point_[i], 1e-6, [] {});
-    EXPECT_LT((analytic.col(i) - numeric).norm(), 1e-5) << i;
-  }
-}
-
-TEST_P(Reprojection, IntrinsicsDerivativesAgreeWithDifferences) {
-  const int size = intrinsics_.block_size();
-  Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor> analytic(2, size);
-  ReprojectionJacobians wanted;
-  wanted.intrinsics = analytic.data();
-  (void)evaluate_reprojection(pose_, intrinsics_, point_, observation_, wanted);
-  for (int i = 0; i < size; ++i) {
-    const auto numeric = slope(intrinsics_.parameters[static_cast<std::size_t>(i)],
-                               i == 0 ? 1e-3 : 1e-6,
-                               [this] { intrinsics_.update(); });
-    EXPECT_LT((analytic.col(i) - numeric).norm(), 1e-4) << i;
-  }
-}
-
-TEST_P(Reprojection, FrozenCoordinateHasNoDerivative) {
-  pose_.frozen_translation = 1;
-  PoseJacobian analytic;
-  ReprojectionJacobians wanted;
-  wanted.pose = analytic.data();
-  (void)evaluate_reprojection(pose_, intrinsics_, point_, observation_, wanted);
-  EXPECT_EQ(analytic.col(4).norm(), 0.0);
-  EXPECT_GT(analytic.col(3).norm(), 0.0);
-}
-
-INSTANTIATE_TEST_SUITE_P(AllLenses,
-                         Reprojection,
-                         ::testing::Values(CameraModel::kPinhole,
-                                           CameraModel::kRadial,
-                                           CameraModel::kBrownConrady,
-                                           CameraModel::kKannalaBrandt));
-
-TEST(Reprojection, BehindTheCameraIsLargeAndFlat) {
-  const PoseState pose;
-  const IntrinsicsState intrinsics(lens(CameraModel::kPinhole), {});
-  BundleObservation observation;
-  observation.inverse_sigma = 0.5F;
-  PointJacobian by_point = PointJacobian::Ones();
-  ReprojectionJacobians wanted;
-  wanted.point = by_point.data();
-  const Eigen::Vector2d residual =
-      evaluate_reprojection(pose, intrinsics, {0.1, 0.1, -2.0}, observation, wanted);
-  EXPECT_EQ(residual, Eigen::Vector2d::Constant(0.5 * kUnprojectablePx));
-  EXPECT_EQ(by_point, PointJacobian::Zero());
-}
-
-TEST(PoseState, ParametersTurnAndShiftInTheCameraFrame) {
-  PoseState pose;
-  pose.base = {Eigen::Quaterniond(Eigen::AngleAxisd(1.0, Eigen::Vector3d::UnitY())), {1, 2, 3}};
-  pose.update();
-  EXPECT_THAT(pose.cam_from_world(), test_support::Rigid3Near(pose.base, 1e-12, 1e-12));
-  pose.parameters = {0.0, 0.0, 1e-3, 0.0, 0.5, 0.0};
-  pose.update();
-  const Rigid3 step{Eigen::Quaterniond(Eigen::AngleAxisd(1e-3, Eigen::Vector3d::UnitZ())),
-                    {0.0, 0.5, 0.0}};
-  EXPECT_THAT(pose.cam_from_world(), test_support::Rigid3Near(step * pose.base, 1e-9, 1e-9));
-  EXPECT_TRUE(pose.rotation.isApprox(pose.cam_from_world().rotation.toRotationMatrix(), 1e-12));
-  EXPECT_TRUE(pose.translation.isApprox(pose.cam_from_world().translation, 1e-12));
-}
 
 // ---------------------------------------------------------------------------------------------------------------------
 // Convergence.
@@ -235,110 +64,6 @@ TEST(BundleAdjustment, ResidualsMeetTheNoiseLessTheFreedoms) {
   const double expected = 0.5 * std::sqrt(2.0 * (equations - unknowns + 7.0) / equations);
   EXPECT_NEAR(report.final_rmse_px, expected, 0.02 * expected);
   EXPECT_THAT(scene, ReconstructionNear(truth, 1e-3, 4e-3));
-}
-
-/// Two cameras under a prior, weights, one held view and wrong keypoints: everything that a solver
-/// has to heed.
-struct HardCase {
-  Scene scene;
-  BundleSelection selection;
-  BundleOptions options = least_squares();
-  std::vector<std::vector<float>> sigmas;
-};
-
-HardCase make_hard_case(RobustLoss loss) {
-  SyntheticSceneOptions scene_options;
-  scene_options.points = 150;
-  scene_options.noise_px = 0.5;
-  scene_options.camera_groups = 2;
-  scene_options.camera = lens(CameraModel::kBrownConrady);
-  const Scene truth = make_truth(scene_options);
-  HardCase out;
-  out.scene = perturbed(truth, {.rotation_rad = 2e-3, .translation = 0.01, .point = 0.01});
-  out.selection = select_everything(out.scene);
-  out.selection.variable_views.erase(out.selection.variable_views.begin() + 2);
-  out.selection.constant_views = {ViewId{2}};
-  out.options.loss = loss;
-  out.options.loss_scale_px = 2.0;
-  out.options.max_iterations = 200;
-  out.options.intrinsics.resize(2);
-  out.options.intrinsics[0].focal = true;
-  out.options.intrinsics[0].focal_sigma_ratio = 0.01;
-  out.options.intrinsics[0].prior = out.scene.cameras[0];
-  out.options.intrinsics[1].focal = true;
-  out.options.intrinsics[1].principal_point = true;
-  out.options.intrinsics[1].principal_point_sigma_px = 5.0;
-  out.options.intrinsics[1].distortion = 4;
-  out.options.intrinsics[1].distortion_sigma = 0.1;
-  out.options.intrinsics[1].prior = out.scene.cameras[1];
-  for (const View& view : out.scene.views) {
-    auto& sigma = out.sigmas.emplace_back(view.keypoints_px.size(), 0.5F);
-    for (std::size_t i = 0; i < sigma.size(); i += 3) {
-      sigma[i] = 1.5F;
-    }
-  }
-  return out;
-}
-
-class SolverAgreement : public ::testing::TestWithParam<RobustLoss> {};
-
-TEST_P(SolverAgreement, OwnSolverFindsTheMinimumOfCeresDenseAndSparse) {
-  const HardCase start = make_hard_case(GetParam());
-  const auto solve = [&start](BundleSolver solver, int dense_views, Scene& scene) {
-    BundleOptions options = start.options;
-    options.solver = solver;
-    options.dense_views = dense_views;
-    return adjust_bundle(scene, start.selection, options, start.sigmas);
-  };
-  Scene own = start.scene;
-  Scene dense = start.scene;
-  Scene sparse = start.scene;
-  const BundleReport own_report = solve(BundleSolver::kSchur, 100, own);
-  const BundleReport dense_report = solve(BundleSolver::kCeres, 100, dense);
-  const BundleReport sparse_report = solve(BundleSolver::kCeres, 0, sparse);
-  EXPECT_NEAR(own_report.initial_cost, dense_report.initial_cost, 1e-9 * own_report.initial_cost);
-  EXPECT_NEAR(own_report.final_cost, dense_report.final_cost, 1e-7 * own_report.final_cost);
-  EXPECT_NEAR(sparse_report.final_cost, dense_report.final_cost, 1e-7 * own_report.final_cost);
-  EXPECT_THAT(own, ReconstructionNear(dense, 1e-5, 1e-5));
-  EXPECT_THAT(sparse, ReconstructionNear(dense, 1e-5, 1e-5));
-  for (std::size_t i = 0; i < 2; ++i) {
-    EXPECT_NEAR(own.cameras[i].fx_px, dense.cameras[i].fx_px, 1e-2);
-    EXPECT_NEAR(own.cameras[i].cy_px, dense.cameras[i].cy_px, 1e-2);
-  }
-}
-
-INSTANTIATE_TEST_SUITE_P(AllLosses,
-                         SolverAgreement,
-                         ::testing::Values(RobustLoss::kNone,
-                                           RobustLoss::kHuber,
-                                           RobustLoss::kSoftL1,
-                                           RobustLoss::kCauchy));
-
-/// The worst that an executor may do to the order of the pieces.
-class BackwardExecutor final : public Executor {
- public:
-  void for_each_index(std::size_t count, const std::function<void(std::size_t)>& work) override {
-    for (std::size_t i = count; i > 0; --i) {
-      work(i - 1);
-    }
-  }
-};
-
-TEST(BundleAdjustment, EveryExecutorGivesTheSameBits) {
-  const Scene start = perturbed(make_truth({.points = 1200, .views = 12, .noise_px = 0.5}),
-                                {.rotation_rad = 2e-3, .translation = 0.01, .point = 0.01});
-  Scene forward = start;
-  Scene backward = start;
-  const BundleReport report = adjust_bundle(forward, select_everything(start), {});
-  ASSERT_GT(report.observations, 8192U);  // several pieces
-  BackwardExecutor executor;
-  (void)adjust_bundle(backward, select_everything(start), {}, {}, executor);
-  for (std::size_t i = 0; i < start.views.size(); ++i) {
-    EXPECT_TRUE(same_bits(*forward.views[i].cam_from_world, *backward.views[i].cam_from_world));
-  }
-  for (std::size_t i = 0; i < start.landmarks.size(); ++i) {
-    EXPECT_EQ(forward.landmarks[i].position_in_world, backward.landmarks[i].position_in_world);
-  }
 }
 
 TEST(BundleAdjustment, ReportsTheLimitOfIterations) {
@@ -635,29 +360,6 @@ TEST(BundleAdjustment, ViewWithoutObservationsKeepsItsPose) {
   const BundleReport report = adjust_bundle(scene, select_everything(scene), {});
   EXPECT_EQ(report.variable_views, scene.views.size() - 2);  // less the lonely and the gauge
   EXPECT_TRUE(same_bits(*scene.views.back().cam_from_world, before));
-}
-
-TEST(BundleAdjustment, TwoRunsGiveTheSameBits) {
-  const Scene start = perturbed(make_truth({.noise_px = 0.5, .dropout_ratio = 0.3}),
-                                {.rotation_rad = 2e-3, .translation = 0.02, .point = 0.02});
-  BundleOptions options;
-  options.intrinsics.resize(1);
-  options.intrinsics[0].focal = true;
-  for (const int dense_views : {100, 0}) {
-    options.dense_views = dense_views;
-    Scene first = start;
-    (void)adjust_bundle(first, select_everything(start), options);
-    const std::vector<double> shift_the_heap(12345, 1.0);
-    Scene second = start;
-    (void)adjust_bundle(second, select_everything(start), options);
-    EXPECT_EQ(first.cameras, second.cameras);
-    for (std::size_t i = 0; i < start.views.size(); ++i) {
-      EXPECT_TRUE(same_bits(*first.views[i].cam_from_world, *second.views[i].cam_from_world));
-    }
-    for (std::size_t i = 0; i < start.landmarks.size(); ++i) {
-      EXPECT_EQ(first.landmarks[i].position_in_world, second.landmarks[i].position_in_world);
-    }
-  }
 }
 
 TEST(BundleSelection, AroundTakesTheLandmarksAndTheirOtherViewsAsConstant) {
