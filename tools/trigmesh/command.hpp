@@ -25,6 +25,7 @@ void finish_command(CommandContext& context, const Result<>& result);
 // options and a callback that does the work and ends with finish_command. To add one, declare it
 // here and name it in add_all_commands (main.cpp). `context` outlives the parsing.
 
+void add_reconstruct_command(CLI::App& app, CommandContext& context);
 void add_export_command(CLI::App& app, CommandContext& context);
 void add_evaluate_command(CLI::App& app, CommandContext& context);
 

@@ -28,6 +28,7 @@ Exit codes:
 )";
 
 void add_all_commands(CLI::App& app, trigmesh::CommandContext& context) {
+  trigmesh::add_reconstruct_command(app, context);
   trigmesh::add_evaluate_command(app, context);
   trigmesh::add_export_command(app, context);
 }

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <chrono>
+
+namespace trigmesh {
+
+/// Where intervals come from, so that tests can say what time it is. Thread-safe.
+class Clock {
+ public:
+  Clock() = default;
+  Clock(const Clock&) = delete;
+  Clock& operator=(const Clock&) = delete;
+  Clock(Clock&&) = delete;
+  Clock& operator=(Clock&&) = delete;
+  virtual ~Clock() = default;
+
+  /// Monotonic time since an arbitrary start.
+  [[nodiscard]] virtual std::chrono::nanoseconds now() const = 0;
+};
+
+/// The machine's monotonic clock.
+class SteadyClock final : public Clock {
+ public:
+  [[nodiscard]] std::chrono::nanoseconds now() const override {
+    return std::chrono::steady_clock::now().time_since_epoch();
+  }
+};
+
+}  // namespace trigmesh

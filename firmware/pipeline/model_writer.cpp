@@ -1,0 +1,77 @@
+#include "firmware/pipeline/model_writer.hpp"
+
+#include <system_error>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "firmware/base/check.hpp"
+#include "firmware/pipeline/report_html.hpp"
+#include "firmware/pipeline/report_json.hpp"
+#include "sfm/exchange/file_io.hpp"
+#include "sfm/exchange/model_folder.hpp"
+#include "sfm/exchange/ply.hpp"
+#include "sfm/exchange/projections.hpp"
+
+namespace trigmesh {
+
+namespace {
+
+Result<> write_component(const Scene& scene, const std::filesystem::path& folder) {
+  TM_RETURN_IF_ERROR(write_text_model(scene, folder / "sparse"));
+  TM_ASSIGN_OR_RETURN(const std::string projections, write_projections(scene));
+  TM_RETURN_IF_ERROR(write_file_atomically(folder / "projections.txt", projections));
+  return write_file_atomically(folder / "sparse.ply", write_ply(colored_points(scene)));
+}
+
+/// The folder in which a model is put together; it goes away unless it becomes the model.
+class StagedFolder {
+ public:
+  explicit StagedFolder(std::filesystem::path path) : path_(std::move(path)) { remove(); }
+  ~StagedFolder() { remove(); }
+  StagedFolder(const StagedFolder&) = delete;
+  StagedFolder& operator=(const StagedFolder&) = delete;
+  StagedFolder(StagedFolder&&) = delete;
+  StagedFolder& operator=(StagedFolder&&) = delete;
+
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  void remove() const {
+    std::error_code ignored;  // a left-over is overwritten by the next run
+    std::filesystem::remove_all(path_, ignored);
+  }
+
+  std::filesystem::path path_;
+};
+
+}  // namespace
+
+Result<> write_model(const std::filesystem::path& output,
+                     std::span<const Scene> components,
+                     const ReconstructionReport& report) {
+  const StagedFolder staged(output / ".model.part");
+  TM_RETURN_IF_ERROR(make_directory(staged.path()));
+  for (std::size_t i = 0; i < components.size(); ++i) {
+    const std::filesystem::path folder = i == 0 ? staged.path() : staged.path() / fmt::format("component_{}", i + 1);
+    TM_RETURN_IF_ERROR(make_directory(folder / "sparse"));
+    TM_RETURN_IF_ERROR(write_component(components[i], folder));
+  }
+  TM_RETURN_IF_ERROR(write_file_atomically(staged.path() / "report.json", render_report_json(report)));
+  TM_RETURN_IF_ERROR(write_file_atomically(staged.path() / "report.html", render_report_html(report, components)));
+  return replace_directory(staged.path(), output / "model");
+}
+
+Result<> write_timings(const std::filesystem::path& output, std::span<const StageTime> times) {
+  nlohmann::ordered_json json;
+  double total = 0.0;
+  for (const StageTime& time : times) {
+    const double seconds = std::chrono::duration<double>(time.duration).count();
+    json["seconds"][std::string(to_string(time.stage))] = seconds;
+    total += seconds;
+  }
+  json["seconds"]["total"] = total;
+  return write_file_atomically(output / "timings.json", json.dump(2) + "\n");
+}
+
+}  // namespace trigmesh

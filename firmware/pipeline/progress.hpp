@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstddef>
+#include <string_view>
+
+namespace trigmesh {
+
+/// The stages of a reconstruction, in order.
+enum class Stage {
+  kExtract,      ///< photographs -> keypoints and descriptors
+  kSelectPairs,  ///< which images are worth comparing
+  kMatch,        ///< pairs -> verified matches
+  kMap,          ///< images -> poses and points
+  kWrite,        ///< model and report -> files
+};
+
+/// "features", "pairs", "matching", "mapping", "writing".
+[[nodiscard]] std::string_view to_string(Stage stage);
+
+/// How far a stage is. `total` may be 0 while it is not known.
+struct Progress {
+  Stage stage = Stage::kExtract;
+  std::size_t done = 0;
+  std::size_t total = 0;
+};
+
+/// Is told how work goes on. Thread-safe: stages report from worker threads.
+class ProgressListener {
+ public:
+  ProgressListener() = default;
+  ProgressListener(const ProgressListener&) = delete;
+  ProgressListener& operator=(const ProgressListener&) = delete;
+  ProgressListener(ProgressListener&&) = delete;
+  ProgressListener& operator=(ProgressListener&&) = delete;
+  virtual ~ProgressListener() = default;
+
+  virtual void on_progress(const Progress& progress) = 0;
+};
+
+}  // namespace trigmesh

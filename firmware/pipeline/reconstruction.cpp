@@ -1,0 +1,220 @@
+#include "firmware/pipeline/reconstruction.hpp"
+
+#include <algorithm>
+#include <map>
+
+#include <fmt/format.h>
+
+#include "firmware/base/check.hpp"
+#include "firmware/pipeline/checkpoint.hpp"
+#include "firmware/pipeline/extraction_stage.hpp"
+#include "firmware/pipeline/mapping_stage.hpp"
+#include "firmware/pipeline/matching_stage.hpp"
+#include "firmware/pipeline/memory_plan.hpp"
+#include "firmware/pipeline/model_writer.hpp"
+#include "firmware/pipeline/worker_pool.hpp"
+#include "sfm/exchange/file_io.hpp"
+#include "sfm/exchange/image_codec.hpp"
+
+namespace trigmesh {
+
+namespace {
+
+constexpr int kMaxThreads = 256;
+
+/// Measures the stages one after the other.
+class Stopwatch {
+ public:
+  explicit Stopwatch(const Clock& clock) : clock_(&clock), last_(clock.now()) {}
+
+  void finish(Stage stage) {
+    const auto now = clock_->now();
+    times_.push_back({stage, now - last_});
+    last_ = now;
+  }
+
+  [[nodiscard]] std::vector<StageTime> times() const { return times_; }
+
+ private:
+  const Clock* clock_;
+  std::chrono::nanoseconds last_;
+  std::vector<StageTime> times_;
+};
+
+/// Size of the largest photograph, from the headers of the files; files that cannot be read count as empty.
+std::int64_t largest_image_pixels(const PhotoSet& photos) {
+  std::int64_t largest = 0;
+  for (std::size_t i = 0; i < photos.names.size(); ++i) {
+    if (const auto file = photos.read(i)) {
+      if (const auto info = probe_image(*file)) {
+        largest = std::max(largest, std::int64_t{info->width_px} * info->height_px);
+      }
+    }
+  }
+  return largest;
+}
+
+Result<MemoryPlan> plan_for(const PhotoSet& photos, const ReconstructionOptions& options) {
+  MemoryDemand demand{photos.names.size(), 0, options.num_threads};
+  if (options.memory_limit_bytes > 0) {
+    demand.largest_image_pixels = largest_image_pixels(photos);
+  }
+  return plan_memory(demand, options.features, options.memory_limit_bytes);
+}
+
+/// Equal files: the later one adds nothing and would only look like perfect overlap.
+void refuse_duplicates(const PhotoSet& photos, std::vector<ExtractedImage>& images) {
+  std::map<std::uint64_t, std::size_t> first_with;
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    if (!images[i].features) {
+      continue;
+    }
+    const auto [place, is_new] = first_with.try_emplace(images[i].features->content, i);
+    if (!is_new) {
+      images[i] = {std::nullopt, {ErrorCode::kInsufficientData, fmt::format("the same file as {}", photos.names[place->second])}};
+    }
+  }
+}
+
+Result<> check_readable(const PhotoSet& photos, const std::vector<ExtractedImage>& images) {
+  if (std::any_of(images.begin(), images.end(), [](const ExtractedImage& image) { return image.features.has_value(); })) {
+    return {};
+  }
+  return fail(ErrorCode::kInsufficientData, "none of the {} photographs can be read; the first, {}: {}", images.size(),
+              photos.names.front(), images.front().error.message);
+}
+
+std::vector<GroupingImage> grouping_images(const PhotoSet& photos, const std::vector<ExtractedImage>& images) {
+  std::vector<GroupingImage> result;
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    result.push_back({photos.names[i], images[i].features ? &*images[i].features : nullptr});
+  }
+  return result;
+}
+
+std::vector<ReportSetting> report_settings(const ReconstructionOptions& options, const MemoryPlan& plan) {
+  return {{"features", std::string(to_string(options.feature_kind))},
+          {"features per image, at most", std::to_string(plan.features.max_keypoints)},
+          {"image size doubled", plan.features.upsample ? "yes" : "no"},
+          {"pairs", std::string(to_string(options.pair_mode))},
+          {"seed", std::to_string(options.seed)}};
+}
+
+std::vector<IntrinsicsOrigin> origins_of(const CameraGroups& cameras) {
+  std::vector<IntrinsicsOrigin> origins;
+  for (const CameraGroup& group : cameras.groups) {
+    origins.push_back(group.knowledge == IntrinsicsKnowledge::kGiven   ? IntrinsicsOrigin::kGiven
+                      : group.knowledge == IntrinsicsKnowledge::kPrior ? IntrinsicsOrigin::kPriorRefined
+                                                                       : IntrinsicsOrigin::kSolved);
+  }
+  return origins;
+}
+
+std::vector<PairEvidence> evidence_of(const std::vector<PairRecord>& pairs) {
+  std::vector<PairEvidence> evidence;
+  for (const PairRecord& record : pairs) {
+    evidence.push_back(
+        {record.pair, record.geometry.kind, record.geometry.candidates, record.geometry.inliers.size()});
+  }
+  return evidence;
+}
+
+ReconstructionReport report_on(const PhotoSet& photos,
+                               const ReconstructionOptions& options,
+                               const MemoryPlan& plan,
+                               const CameraGroups& cameras,
+                               const std::vector<PairRecord>& pairs,
+                               const MappedPhotos& mapped) {
+  const std::vector<PairEvidence> evidence = evidence_of(pairs);
+  const std::vector<IntrinsicsOrigin> origins = origins_of(cameras);
+  ReportInput input;
+  input.components = mapped.components;
+  input.images = mapped.outcomes;
+  input.pairs = evidence;
+  input.intrinsics_origins = origins;
+  input.settings = report_settings(options, plan);
+  for (const std::string& sentence : plan.lowered) {
+    input.notes.push_back({NoteSeverity::kWarning, sentence});
+  }
+  input.software_version = options.software_version;
+  input.input_description = photos.description;
+  return build_report(input);
+}
+
+}  // namespace
+
+std::string_view to_string(Stage stage) {
+  switch (stage) {
+    case Stage::kExtract:
+      return "features";
+    case Stage::kSelectPairs:
+      return "pairs";
+    case Stage::kMatch:
+      return "matching";
+    case Stage::kMap:
+      return "mapping";
+    case Stage::kWrite:
+      break;
+  }
+  return "writing";
+}
+
+Result<> ReconstructionOptions::validate() const {
+  TM_RETURN_IF_ERROR(features.validate());
+  TM_RETURN_IF_ERROR(mapper.validate());
+  if (num_threads < 1 || num_threads > kMaxThreads) {
+    return fail(ErrorCode::kInvalidArgument, "the number of threads is {}: it must be in [1, {}]", num_threads, kMaxThreads);
+  }
+  for (const Camera& camera : cameras) {
+    TM_RETURN_IF_ERROR(camera.validate());
+  }
+  return {};
+}
+
+Result<ReconstructionSummary> reconstruct(const PhotoSet& photos,
+                                          const std::filesystem::path& output,
+                                          const ReconstructionOptions& options,
+                                          const Clock& clock,
+                                          ProgressListener& listener,
+                                          const std::stop_token& stop) {
+  TM_RETURN_IF_ERROR(options.validate());
+  if (photos.names.empty()) {
+    return fail(ErrorCode::kInsufficientData, "there are no photographs to reconstruct from");
+  }
+  TM_RETURN_IF_ERROR(make_directory(output));
+  TM_ASSIGN_OR_RETURN(const CheckpointFolder checkpoints, CheckpointFolder::open(output / "work"));
+  TM_ASSIGN_OR_RETURN(const MemoryPlan plan, plan_for(photos, options));
+  WorkerPool pool(options.num_threads);
+  WorkerPool extraction_pool(plan.extraction_threads);
+  Stopwatch stopwatch(clock);
+
+  const StageContext extraction{extraction_pool, checkpoints, listener, stop};
+  TM_ASSIGN_OR_RETURN(auto images, extract_photos(photos, options.feature_kind, plan.features, extraction));
+  TM_RETURN_IF_ERROR(check_readable(photos, images));
+  refuse_duplicates(photos, images);
+  TM_ASSIGN_OR_RETURN(const CameraGroups cameras,
+                      group_cameras(grouping_images(photos, images), options.cameras, options.grouping));
+  stopwatch.finish(Stage::kExtract);
+
+  const StageContext context{pool, checkpoints, listener, stop};
+  TM_ASSIGN_OR_RETURN(const auto pairs,
+                      match_photos(images, cameras, {options.pair_mode, photos.ordered, options.seed}, context));
+  stopwatch.finish(Stage::kMatch);
+
+  MapperOptions mapper = options.mapper;
+  mapper.seed = options.seed;
+  TM_ASSIGN_OR_RETURN(const MappedPhotos mapped, map_photos(photos, images, cameras, pairs, mapper, context));
+  stopwatch.finish(Stage::kMap);
+
+  listener.on_progress({Stage::kWrite, 0, 1});
+  ReconstructionSummary summary{report_on(photos, options, plan, cameras, pairs, mapped), {}};
+  TM_RETURN_IF_ERROR(write_model(output, mapped.components, summary.report));
+  stopwatch.finish(Stage::kWrite);
+  summary.times = stopwatch.times();
+  TM_RETURN_IF_ERROR(write_timings(output, summary.times));
+  checkpoints.discard();
+  listener.on_progress({Stage::kWrite, 1, 1});
+  return summary;
+}
+
+}  // namespace trigmesh

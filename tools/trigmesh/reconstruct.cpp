@@ -1,0 +1,158 @@
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "drivers/camera/replay/recording.hpp"
+#include "firmware/base/check.hpp"
+#include "firmware/pipeline/reconstruction.hpp"
+#include "sfm/exchange/camera_profile.hpp"
+#include "tools/trigmesh/command.hpp"
+#include "tools/trigmesh/interrupt.hpp"
+#include "tools/trigmesh/progress_printer.hpp"
+
+namespace trigmesh {
+
+namespace {
+
+constexpr const char* kFooter = R"(Examples:
+  trigmesh reconstruct photos --output model
+  trigmesh reconstruct photos --output model --camera rig.toml
+  trigmesh reconstruct recording --output model --match sequential --threads 2
+  trigmesh reconstruct list.txt --output model --memory-limit 500M
+
+INPUT is a folder of JPEG or PNG photographs, a text file with one path a line, or a recording (a folder with
+images/ and, if there is one, timestamps.csv). The result is OUTPUT/model: sparse/ (COLMAP text), projections.txt,
+sparse.ply, report.json and report.html. When interrupted, the same command goes on where it stopped.
+)";
+
+/// The options as they come from the command line.
+struct ReconstructArguments {
+  std::string input;
+  std::string output;
+  std::string camera_file;
+  std::string grouping = "auto";
+  std::string features = "sift";
+  std::string match = "auto";
+  std::string stop_after = "sparse";
+  int threads = 0;
+  int max_features = FeatureOptions{}.max_keypoints;
+  bool upright = false;
+  bool quiet = false;
+  std::uint64_t memory_limit_bytes = 0;
+  std::uint64_t seed = 0;
+};
+
+Result<PhotoSet> open_photos(const std::string& input) {
+  TM_ASSIGN_OR_RETURN(const Recording recording, Recording::open(input));
+  PhotoSet photos;
+  for (const RecordedFrame& frame : recording.frames()) {
+    photos.names.push_back(frame.name);
+  }
+  photos.ordered = recording.kind() == RecordingKind::kRecording && recording.frames().front().timestamp.has_value();
+  photos.description = fmt::format("{}, {} photographs", to_string(recording.kind()), recording.size());
+  photos.read = [recording](std::size_t i) -> Result<std::vector<std::uint8_t>> {
+    TM_ASSIGN_OR_RETURN(Frame frame, recording.frame(i));
+    return std::move(frame.bytes);
+  };
+  return photos;
+}
+
+Result<ReconstructionOptions> options_from(const ReconstructArguments& arguments) {
+  ReconstructionOptions options;
+  options.feature_kind = *feature_kind_from_string(arguments.features);  // CLI11 has checked the names
+  options.pair_mode = *pair_mode_from_string(arguments.match);
+  options.grouping = *grouping_mode_from_string(arguments.grouping);
+  options.features.max_keypoints = arguments.max_features;
+  options.features.oriented = !arguments.upright;
+  options.num_threads =
+      arguments.threads > 0 ? arguments.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  options.memory_limit_bytes = arguments.memory_limit_bytes;
+  options.seed = arguments.seed;
+  options.software_version = "trigmesh " TRIGMESH_VERSION;
+  if (!arguments.camera_file.empty()) {
+    TM_ASSIGN_OR_RETURN(const std::vector<CameraProfile> profiles, read_camera_file(arguments.camera_file));
+    for (const CameraProfile& profile : profiles) {
+      options.cameras.push_back(profile.camera);
+    }
+  }
+  return options;
+}
+
+void print_summary(const ReconstructionReport& report, const std::string& output) {
+  fmt::print("{}\n", report.verdict_sentence);
+  for (const ImageReport& image : report.images) {
+    if (image.reason != RefusalReason::kNone) {
+      fmt::print("  refused {}: {} - {}\n", image.name, to_string(image.reason), image.detail);
+    }
+  }
+  for (const ReportNote& note : report.notes) {
+    fmt::print("  {}: {}\n", to_string(note.severity), note.text);
+  }
+  fmt::print("{} points, mean reprojection error {:.2f} px\nresult in {}/model, open {}/model/report.html\n",
+             report.overall.points, report.overall.mean_error_px, output, output);
+}
+
+Result<> run(const ReconstructArguments& arguments) {
+  TM_ASSIGN_OR_RETURN(const ReconstructionOptions options, options_from(arguments));
+  TM_ASSIGN_OR_RETURN(const PhotoSet photos, open_photos(arguments.input));
+  const SteadyClock clock;
+  const InterruptWatch interrupt;
+  std::optional<ReconstructionSummary> summary;
+  {
+    ProgressPrinter printer(
+        arguments.quiet ? ProgressPrinter::Style::kQuiet : ProgressPrinter::style_of_stderr(), clock);
+    TM_ASSIGN_OR_RETURN(summary, reconstruct(photos, arguments.output, options, clock, printer, interrupt.token()));
+  }
+  print_summary(summary->report, arguments.output);
+  if (summary->report.components.empty()) {
+    return fail(ErrorCode::kInsufficientData,
+                "no model could be made from {}; {}/model/report.html tells why for each photograph and what to do",
+                arguments.input, arguments.output);
+  }
+  return {};
+}
+
+}  // namespace
+
+void add_reconstruct_command(CLI::App& app, CommandContext& context) {
+  CLI::App* command = app.add_subcommand("reconstruct", "Make camera poses and a coloured point cloud from photographs");
+  auto arguments = std::make_shared<ReconstructArguments>();
+  command->add_option("INPUT", arguments->input, "Folder of photographs, list file or recording")->required();
+  command->add_option("-o,--output", arguments->output, "Folder for the result; made when missing")->required();
+  command->add_option("--camera", arguments->camera_file,
+                      "Known intrinsics: a profile of trigmesh calibrate or a COLMAP cameras.txt; else the focal length in EXIF "
+                      "is a first guess, else it is solved");
+  command->add_option("--camera-groups", arguments->grouping, "Which photographs share a camera: by EXIF and size, all, by subfolder, none")
+      ->check(CLI::IsMember({"auto", "single", "folder", "image"}))
+      ->capture_default_str();
+  command->add_option("--features", arguments->features, "Kind of features")
+      ->check(CLI::IsMember({"sift", "surf", "akaze", "orb"}))
+      ->capture_default_str();
+  command->add_option("--max-features", arguments->max_features, "Most features kept per photograph")
+      ->check(CLI::Range(16, 100000))
+      ->capture_default_str();
+  command->add_flag("--upright", arguments->upright, "The camera was never rolled: features need no orientation");
+  command->add_option("--match", arguments->match, "Which photographs are compared")
+      ->check(CLI::IsMember({"auto", "sequential", "retrieval", "exhaustive"}))
+      ->capture_default_str();
+  command->add_option("--threads", arguments->threads, "Threads that work; 0 = one a core. The result does not depend on it")
+      ->check(CLI::Range(0, 256))
+      ->capture_default_str();
+  command->add_option("--memory-limit", arguments->memory_limit_bytes,
+                      "Most memory to use, e.g. 500M or 2G; quality is lowered to keep it, and the report says how")
+      ->transform(CLI::AsSizeValue(true));
+  command->add_option("--stop-after", arguments->stop_after, "Last stage")
+      ->check(CLI::IsMember({"sparse"}))
+      ->capture_default_str();
+  command->add_option("--seed", arguments->seed, "Start of all random sampling")->capture_default_str();
+  command->add_flag("--quiet", arguments->quiet, "No progress");
+  command->footer(kFooter);
+  command->callback([arguments, &context] { finish_command(context, run(*arguments)); });
+}
+
+}  // namespace trigmesh
