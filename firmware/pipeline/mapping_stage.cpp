@@ -22,7 +22,8 @@ void color_landmarks(Scene& scene, const std::vector<ExtractedImage>& images) {
   for (Landmark& landmark : scene.landmarks) {
     std::array<unsigned, 3> sum{};
     for (const Observation& observation : landmark.track) {
-      const Rgb& color = images[index(observation.view)].features->colors[index(observation.feature)];
+      const Rgb& color =
+          images[index(observation.view)].features->colors[index(observation.feature)];
       for (std::size_t c = 0; c < 3; ++c) {
         sum[c] += color[c];
       }

@@ -11,19 +11,20 @@
 
 namespace trigmesh {
 
-/// What mapping found: models, largest first, coloured; and what became of each photograph, in input order.
+/// What mapping found: models, largest first, coloured; and what became of each photograph, in
+/// input order.
 struct MappedPhotos {
   std::vector<Scene> components;
   std::vector<ImageOutcome> outcomes;
 };
 
-/// Gives all images and pairs to the mapper, strongest pairs first, and lets it work until nothing can be added.
-/// Errors: kCancelled, kInvalidArgument (options).
+/// Gives all images and pairs to the mapper, strongest pairs first, and lets it work until nothing
+/// can be added. Errors: kCancelled, kInvalidArgument (options).
 [[nodiscard]] Result<MappedPhotos> map_photos(const PhotoSet& photos,
-                                             const std::vector<ExtractedImage>& images,
-                                             const CameraGroups& cameras,
-                                             const std::vector<PairRecord>& pairs,
-                                             const MapperOptions& options,
-                                             const StageContext& context);
+                                              const std::vector<ExtractedImage>& images,
+                                              const CameraGroups& cameras,
+                                              const std::vector<PairRecord>& pairs,
+                                              const MapperOptions& options,
+                                              const StageContext& context);
 
 }  // namespace trigmesh

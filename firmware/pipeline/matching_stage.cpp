@@ -1,13 +1,13 @@
 #include "firmware/pipeline/matching_stage.hpp"
 
 #include <algorithm>
+#include <limits>
 
 #include <fmt/format.h>
 
 #include "firmware/base/check.hpp"
 #include "firmware/pipeline/binary_stream.hpp"
-#include "sfm/matching/descriptor_matcher.hpp"
-#include "sfm/matching/two_view_verification.hpp"
+#include "sfm/matching/pair_matching.hpp"
 
 namespace trigmesh {
 
@@ -15,35 +15,34 @@ namespace {
 
 constexpr const char* kCheckpoint = "pairs";
 
-/// What comparing needs of one image.
-struct ComparableImage {
-  std::optional<DescriptorIndex> index;  ///< absent for an unreadable image
-  std::vector<Eigen::Vector2d> undistorted_px;
-  VerificationImage view;
-};
-
-/// Pixels as a lens without distortion would give them; a keypoint without a ray becomes not-a-number, which no match survives.
-std::vector<Eigen::Vector2d> undistort(const Camera& camera, const std::vector<Keypoint>& keypoints) {
+/// Pixels as a lens without distortion would give them; a keypoint without a ray becomes
+/// not-a-number, which no match survives.
+std::vector<Eigen::Vector2d> undistort(const Camera& camera,
+                                       const std::vector<Keypoint>& keypoints) {
   Camera ideal = camera;
   ideal.model = CameraModel::kPinhole;
   std::vector<Eigen::Vector2d> result;
   result.reserve(keypoints.size());
   for (const Keypoint& keypoint : keypoints) {
-    const Eigen::Vector2d pixel(static_cast<double>(keypoint.x_px), static_cast<double>(keypoint.y_px));
+    const Eigen::Vector2d pixel(static_cast<double>(keypoint.x_px),
+                                static_cast<double>(keypoint.y_px));
     const auto ray = normalize_pixel(camera, pixel);
     const auto straight = ray ? project(ideal, ray->homogeneous()) : std::nullopt;
-    result.push_back(straight.value_or(Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN())));
+    result.push_back(
+        straight.value_or(Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN())));
   }
   return result;
 }
 
-Result<ComparableImage> prepare(const ImageFeatures& image, const CameraGroup& group) {
-  ComparableImage result;
-  TM_ASSIGN_OR_RETURN(result.index, DescriptorIndex::build(image.features));
-  result.undistorted_px = undistort(group.camera, image.features.keypoints);
-  result.view = {result.undistorted_px, image.width_px, image.height_px, std::nullopt};
+Result<MatchableImage> prepare(const ImageFeatures& image, const CameraGroup& group) {
+  TM_ASSIGN_OR_RETURN(DescriptorIndex index, DescriptorIndex::build(image.features));
+  MatchableImage result{std::move(index),
+                        undistort(group.camera, image.features.keypoints),
+                        image.width_px,
+                        image.height_px,
+                        std::nullopt};
   if (group.knowledge != IntrinsicsKnowledge::kUnknown) {
-    result.view.calibration = group.camera.calibration_matrix();
+    result.calibration = group.camera.calibration_matrix();
   }
   return result;
 }
@@ -51,12 +50,15 @@ Result<ComparableImage> prepare(const ImageFeatures& image, const CameraGroup& g
 std::uint64_t key_of(const std::vector<ExtractedImage>& images,
                      const CameraGroups& cameras,
                      const MatchingStageOptions& options) {
-  std::string text = fmt::format("{} {} {}", static_cast<int>(options.pair_mode), options.ordered, options.seed);
+  std::string text =
+      fmt::format("{} {} {}", static_cast<int>(options.pair_mode), options.ordered, options.seed);
   for (std::size_t i = 0; i < images.size(); ++i) {
     const CameraGroup& group = cameras.groups[index(cameras.group_of_image[i])];
     const FeatureSet* features = images[i].features ? &images[i].features->features : nullptr;
-    text += fmt::format("\n{} {} {}", images[i].features ? images[i].features->content : 0,
-                        features != nullptr ? content_hash(features->descriptors) : 0, static_cast<int>(group.knowledge));
+    text += fmt::format("\n{} {} {}",
+                        images[i].features ? images[i].features->content : 0,
+                        features != nullptr ? content_hash(features->descriptors) : 0,
+                        static_cast<int>(group.knowledge));
     for (const double value : group.camera.intrinsics()) {
       text += fmt::format(" {}", value);
     }
@@ -64,17 +66,33 @@ std::uint64_t key_of(const std::vector<ExtractedImage>& images,
   return content_hash(text);
 }
 
-TwoViewGeometry compare(const ComparableImage& first, const ComparableImage& second, const MatchingStageOptions& options) {
-  MatchOptions matching;
-  VerificationOptions verification;
-  verification.seed = static_cast<int>(options.seed & 0x7fffffffU);
-  return verify_pair(match_descriptors(*first.index, *second.index, matching), first.view, second.view, verification);
+/// All images; an unreadable one has no features and so is in no pair.
+Result<std::vector<MatchableImage>> prepare_all(const std::vector<ExtractedImage>& images,
+                                                const CameraGroups& cameras) {
+  // The index of an image borrows its descriptors, so nothing here may be a copy.
+  static const ImageFeatures nothing;
+  std::vector<MatchableImage> result;
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    const CameraGroup& group = cameras.groups[index(cameras.group_of_image[i])];
+    TM_ASSIGN_OR_RETURN(MatchableImage image,
+                        prepare(images[i].features ? *images[i].features : nothing, group));
+    result.push_back(std::move(image));
+  }
+  return result;
 }
 
-Result<std::vector<ImagePair>> choose_pairs(const std::vector<ExtractedImage>& images, const std::vector<ComparableImage>&, const MatchingStageOptions&, const StageContext&) {
-  std::vector<ImagePair> r;
-  for (std::size_t i = 0; i < images.size(); ++i) for (std::size_t j = i + 1; j < images.size(); ++j) if (images[i].features && images[j].features) r.push_back({id_of<ViewId>(i), id_of<ViewId>(j)});
-  return r;
+Result<std::vector<ImagePair>> choose_pairs(const std::vector<MatchableImage>& images,
+                                            const MatchingStageOptions& options,
+                                            const StageContext& context) {
+  context.listener.on_progress({Stage::kSelectPairs, 0, 0});
+  std::vector<DescriptorIndex> indexes;
+  for (const MatchableImage& image : images) {
+    indexes.push_back(image.index);
+  }
+  PairSelectionOptions selection;
+  selection.mode = options.pair_mode;
+  selection.order = options.ordered ? ImageOrder::kSequence : ImageOrder::kUnordered;
+  return select_pairs(indexes, selection, context.executor);
 }
 
 }  // namespace
@@ -131,22 +149,20 @@ Result<std::vector<PairRecord>> match_photos(const std::vector<ExtractedImage>& 
       return std::move(*stored);
     }
   }
-  std::vector<ComparableImage> comparable(images.size());
-  for (std::size_t i = 0; i < images.size(); ++i) {
-    if (images[i].features) {
-      const CameraGroup& group = cameras.groups[index(cameras.group_of_image[i])];
-      TM_ASSIGN_OR_RETURN(comparable[i], prepare(*images[i].features, group));
-      comparable[i].view.points_px = comparable[i].undistorted_px;
-    }
-  }
-  TM_ASSIGN_OR_RETURN(const std::vector<ImagePair> chosen, choose_pairs(images, comparable, options, context));
+  TM_ASSIGN_OR_RETURN(const std::vector<MatchableImage> matchable, prepare_all(images, cameras));
+  TM_ASSIGN_OR_RETURN(const std::vector<ImagePair> chosen,
+                      choose_pairs(matchable, options, context));
+  PairMatchingOptions matching;
+  matching.verification.seed = static_cast<int>(options.seed & 0x7fffffffU);
   std::vector<PairRecord> pairs(chosen.size());
   StageProgress progress(context, Stage::kMatch, chosen.size());
   context.executor.for_each_index(chosen.size(), [&](std::size_t i) {
     if (context.stop.stop_requested()) {
       return;
     }
-    pairs[i] = {chosen[i], compare(comparable[index(chosen[i].first)], comparable[index(chosen[i].second)], options)};
+    const ImagePair pair = chosen[i];
+    pairs[i] = {pair,
+                match_pair(matchable[index(pair.first)], matchable[index(pair.second)], matching)};
     progress.advance();
   });
   if (context.stop.stop_requested()) {

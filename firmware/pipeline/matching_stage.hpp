@@ -18,12 +18,14 @@ struct MatchingStageOptions {
   std::uint64_t seed = 0;
 };
 
-/// Compares the images that are worth it and verifies what matches by epipolar geometry. Pairs in ascending order, those
-/// without any candidates left out. The finished stage is a checkpoint. Errors: kCancelled; kIo, kNoSpace of the checkpoints.
-[[nodiscard]] Result<std::vector<PairRecord>> match_photos(const std::vector<ExtractedImage>& images,
-                                                          const CameraGroups& cameras,
-                                                          const MatchingStageOptions& options,
-                                                          const StageContext& context);
+/// Compares the images that are worth it and verifies what matches by epipolar geometry. Pairs in
+/// ascending order, those without any candidates left out. The finished stage is a checkpoint.
+/// Errors: kCancelled; kIo, kNoSpace of the checkpoints.
+[[nodiscard]] Result<std::vector<PairRecord>> match_photos(
+    const std::vector<ExtractedImage>& images,
+    const CameraGroups& cameras,
+    const MatchingStageOptions& options,
+    const StageContext& context);
 
 /// Bytes for a checkpoint and back. Decoding anything else gives kCorruptData.
 [[nodiscard]] std::vector<std::uint8_t> encode_pairs(const std::vector<PairRecord>& pairs);

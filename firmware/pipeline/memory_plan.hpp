@@ -24,9 +24,10 @@ struct MemoryDemand {
   int threads = 1;
 };
 
-/// Lowers, in this order and only as far as needed: photographs worked on at once (costs time only), doubling of the image size,
-/// keypoints per image (in halves, to no fewer than 1000). The last two depend on the limit, never on the number of threads.
-/// `limit_bytes` 0 means no limit. kLimitExceeded when even the lowest settings need more.
+/// Lowers, in this order and only as far as needed: photographs worked on at once (costs time
+/// only), doubling of the image size, keypoints per image (in halves, to no fewer than 1000). The
+/// last two depend on the limit, never on the number of threads. `limit_bytes` 0 means no limit.
+/// kLimitExceeded when even the lowest settings need more.
 [[nodiscard]] Result<MemoryPlan> plan_memory(const MemoryDemand& demand,
                                              const FeatureOptions& wanted,
                                              std::uint64_t limit_bytes);

@@ -28,7 +28,9 @@ Result<> write_component(const Scene& scene, const std::filesystem::path& folder
 class StagedFolder {
  public:
   explicit StagedFolder(std::filesystem::path path) : path_(std::move(path)) { remove(); }
+
   ~StagedFolder() { remove(); }
+
   StagedFolder(const StagedFolder&) = delete;
   StagedFolder& operator=(const StagedFolder&) = delete;
   StagedFolder(StagedFolder&&) = delete;
@@ -53,12 +55,15 @@ Result<> write_model(const std::filesystem::path& output,
   const StagedFolder staged(output / ".model.part");
   TM_RETURN_IF_ERROR(make_directory(staged.path()));
   for (std::size_t i = 0; i < components.size(); ++i) {
-    const std::filesystem::path folder = i == 0 ? staged.path() : staged.path() / fmt::format("component_{}", i + 1);
+    const std::filesystem::path folder =
+        i == 0 ? staged.path() : staged.path() / fmt::format("component_{}", i + 1);
     TM_RETURN_IF_ERROR(make_directory(folder / "sparse"));
     TM_RETURN_IF_ERROR(write_component(components[i], folder));
   }
-  TM_RETURN_IF_ERROR(write_file_atomically(staged.path() / "report.json", render_report_json(report)));
-  TM_RETURN_IF_ERROR(write_file_atomically(staged.path() / "report.html", render_report_html(report, components)));
+  TM_RETURN_IF_ERROR(
+      write_file_atomically(staged.path() / "report.json", render_report_json(report)));
+  TM_RETURN_IF_ERROR(
+      write_file_atomically(staged.path() / "report.html", render_report_html(report, components)));
   return replace_directory(staged.path(), output / "model");
 }
 

@@ -5,20 +5,22 @@
 #include <vector>
 
 #include "firmware/base/result.hpp"
-#include "firmware/pipeline/report.hpp"
 #include "firmware/pipeline/reconstruction.hpp"
+#include "firmware/pipeline/report.hpp"
 #include "sfm/scene/scene.hpp"
 
 namespace trigmesh {
 
-/// Writes `output`/model in one step: sparse/ (COLMAP text), projections.txt and sparse.ply of the main model, for each
-/// further model component_N/ with the same files, report.json and report.html. Before the step an older model stays as it
-/// is. Without any model only the reports are written. kIo, kNoSpace.
+/// Writes `output`/model in one step: sparse/ (COLMAP text), projections.txt and sparse.ply of the
+/// main model, for each further model component_N/ with the same files, report.json and
+/// report.html. Before the step an older model stays as it is. Without any model only the reports
+/// are written. kIo, kNoSpace.
 [[nodiscard]] Result<> write_model(const std::filesystem::path& output,
                                    std::span<const Scene> components,
                                    const ReconstructionReport& report);
 
 /// Writes `output`/timings.json: seconds per stage. Clock times live here and nowhere else.
-[[nodiscard]] Result<> write_timings(const std::filesystem::path& output, std::span<const StageTime> times);
+[[nodiscard]] Result<> write_timings(const std::filesystem::path& output,
+                                     std::span<const StageTime> times);
 
 }  // namespace trigmesh

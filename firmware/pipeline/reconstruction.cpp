@@ -41,7 +41,8 @@ class Stopwatch {
   std::vector<StageTime> times_;
 };
 
-/// Size of the largest photograph, from the headers of the files; files that cannot be read count as empty.
+/// Size of the largest photograph, from the headers of the files; files that cannot be read count
+/// as empty.
 std::int64_t largest_image_pixels(const PhotoSet& photos) {
   std::int64_t largest = 0;
   for (std::size_t i = 0; i < photos.names.size(); ++i) {
@@ -71,20 +72,28 @@ void refuse_duplicates(const PhotoSet& photos, std::vector<ExtractedImage>& imag
     }
     const auto [place, is_new] = first_with.try_emplace(images[i].features->content, i);
     if (!is_new) {
-      images[i] = {std::nullopt, {ErrorCode::kInsufficientData, fmt::format("the same file as {}", photos.names[place->second])}};
+      images[i] = {std::nullopt,
+                   {ErrorCode::kInsufficientData,
+                    fmt::format("the same file as {}", photos.names[place->second])}};
     }
   }
 }
 
 Result<> check_readable(const PhotoSet& photos, const std::vector<ExtractedImage>& images) {
-  if (std::any_of(images.begin(), images.end(), [](const ExtractedImage& image) { return image.features.has_value(); })) {
+  if (std::any_of(images.begin(), images.end(), [](const ExtractedImage& image) {
+        return image.features.has_value();
+      })) {
     return {};
   }
-  return fail(ErrorCode::kInsufficientData, "none of the {} photographs can be read; the first, {}: {}", images.size(),
-              photos.names.front(), images.front().error.message);
+  return fail(ErrorCode::kInsufficientData,
+              "none of the {} photographs can be read; the first, {}: {}",
+              images.size(),
+              photos.names.front(),
+              images.front().error.message);
 }
 
-std::vector<GroupingImage> grouping_images(const PhotoSet& photos, const std::vector<ExtractedImage>& images) {
+std::vector<GroupingImage> grouping_images(const PhotoSet& photos,
+                                           const std::vector<ExtractedImage>& images) {
   std::vector<GroupingImage> result;
   for (std::size_t i = 0; i < images.size(); ++i) {
     result.push_back({photos.names[i], images[i].features ? &*images[i].features : nullptr});
@@ -92,7 +101,8 @@ std::vector<GroupingImage> grouping_images(const PhotoSet& photos, const std::ve
   return result;
 }
 
-std::vector<ReportSetting> report_settings(const ReconstructionOptions& options, const MemoryPlan& plan) {
+std::vector<ReportSetting> report_settings(const ReconstructionOptions& options,
+                                           const MemoryPlan& plan) {
   return {{"features", std::string(to_string(options.feature_kind))},
           {"features per image, at most", std::to_string(plan.features.max_keypoints)},
           {"image size doubled", plan.features.upsample ? "yes" : "no"},
@@ -103,9 +113,10 @@ std::vector<ReportSetting> report_settings(const ReconstructionOptions& options,
 std::vector<IntrinsicsOrigin> origins_of(const CameraGroups& cameras) {
   std::vector<IntrinsicsOrigin> origins;
   for (const CameraGroup& group : cameras.groups) {
-    origins.push_back(group.knowledge == IntrinsicsKnowledge::kGiven   ? IntrinsicsOrigin::kGiven
-                      : group.knowledge == IntrinsicsKnowledge::kPrior ? IntrinsicsOrigin::kPriorRefined
-                                                                       : IntrinsicsOrigin::kSolved);
+    origins.push_back(group.knowledge == IntrinsicsKnowledge::kGiven ? IntrinsicsOrigin::kGiven
+                      : group.knowledge == IntrinsicsKnowledge::kPrior
+                          ? IntrinsicsOrigin::kPriorRefined
+                          : IntrinsicsOrigin::kSolved);
   }
   return origins;
 }
@@ -113,8 +124,10 @@ std::vector<IntrinsicsOrigin> origins_of(const CameraGroups& cameras) {
 std::vector<PairEvidence> evidence_of(const std::vector<PairRecord>& pairs) {
   std::vector<PairEvidence> evidence;
   for (const PairRecord& record : pairs) {
-    evidence.push_back(
-        {record.pair, record.geometry.kind, record.geometry.candidates, record.geometry.inliers.size()});
+    evidence.push_back({record.pair,
+                        record.geometry.kind,
+                        record.geometry.candidates,
+                        record.geometry.inliers.size()});
   }
   return evidence;
 }
@@ -163,7 +176,10 @@ Result<> ReconstructionOptions::validate() const {
   TM_RETURN_IF_ERROR(features.validate());
   TM_RETURN_IF_ERROR(mapper.validate());
   if (num_threads < 1 || num_threads > kMaxThreads) {
-    return fail(ErrorCode::kInvalidArgument, "the number of threads is {}: it must be in [1, {}]", num_threads, kMaxThreads);
+    return fail(ErrorCode::kInvalidArgument,
+                "the number of threads is {}: it must be in [1, {}]",
+                num_threads,
+                kMaxThreads);
   }
   for (const Camera& camera : cameras) {
     TM_RETURN_IF_ERROR(camera.validate());
@@ -189,21 +205,25 @@ Result<ReconstructionSummary> reconstruct(const PhotoSet& photos,
   Stopwatch stopwatch(clock);
 
   const StageContext extraction{extraction_pool, checkpoints, listener, stop};
-  TM_ASSIGN_OR_RETURN(auto images, extract_photos(photos, options.feature_kind, plan.features, extraction));
+  TM_ASSIGN_OR_RETURN(auto images,
+                      extract_photos(photos, options.feature_kind, plan.features, extraction));
   TM_RETURN_IF_ERROR(check_readable(photos, images));
   refuse_duplicates(photos, images);
-  TM_ASSIGN_OR_RETURN(const CameraGroups cameras,
-                      group_cameras(grouping_images(photos, images), options.cameras, options.grouping));
+  TM_ASSIGN_OR_RETURN(
+      const CameraGroups cameras,
+      group_cameras(grouping_images(photos, images), options.cameras, options.grouping));
   stopwatch.finish(Stage::kExtract);
 
   const StageContext context{pool, checkpoints, listener, stop};
-  TM_ASSIGN_OR_RETURN(const auto pairs,
-                      match_photos(images, cameras, {options.pair_mode, photos.ordered, options.seed}, context));
+  TM_ASSIGN_OR_RETURN(
+      const auto pairs,
+      match_photos(images, cameras, {options.pair_mode, photos.ordered, options.seed}, context));
   stopwatch.finish(Stage::kMatch);
 
   MapperOptions mapper = options.mapper;
   mapper.seed = options.seed;
-  TM_ASSIGN_OR_RETURN(const MappedPhotos mapped, map_photos(photos, images, cameras, pairs, mapper, context));
+  TM_ASSIGN_OR_RETURN(const MappedPhotos mapped,
+                      map_photos(photos, images, cameras, pairs, mapper, context));
   stopwatch.finish(Stage::kMap);
 
   listener.on_progress({Stage::kWrite, 0, 1});

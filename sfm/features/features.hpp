@@ -63,7 +63,7 @@ struct FeatureOptions {
   bool oriented = true;
   /// SIFT and SURF: start at twice the image size. Finds about four times as many points at four
   /// times the cost.
-  bool upsample = false;
+  bool upsample = true;
 
   [[nodiscard]] Result<> validate() const;
 };

@@ -58,7 +58,7 @@ void MapBuilder::follow_store(std::span<const TrackId> absorbed) {
 }
 
 ModelAdjustment MapBuilder::adjustment() const {
-  ModelAdjustment adjustment(*options_, store_->sigmas_px);
+  ModelAdjustment adjustment(*options_, store_->sigmas_px, *executor_);
   for (const CameraRecord& camera : store_->cameras) {
     adjustment.add_camera(camera.camera, camera.knowledge);
   }

@@ -23,6 +23,7 @@ constexpr double kMaxJoinErrorRatio = 0.03;
 constexpr std::size_t kMinViewsOfModel = 2;
 // A keypoint found at a coarse scale is placed that much less exactly.
 constexpr float kReferenceScalePx = 2.0F;
+constexpr float kFinestScalePx = 0.5F;
 
 template <typename T>
 bool between(T value, T low, T high) {
@@ -114,7 +115,7 @@ ViewId Mapper::add_image(MapperImage image) {
   sigmas.reserve(image.keypoints.size());
   for (const Keypoint& keypoint : image.keypoints) {
     record.keypoints_px.emplace_back(keypoint.x_px, keypoint.y_px);
-    sigmas.push_back(std::sqrt(std::max(keypoint.scale_px, 0.5F) / kReferenceScalePx));
+    sigmas.push_back(std::max(keypoint.scale_px, kFinestScalePx) / kReferenceScalePx);
   }
   store.tracks.add_view(record.keypoints_px.size());
   store.images.push_back(std::move(record));

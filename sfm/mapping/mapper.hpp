@@ -36,8 +36,9 @@ struct MapperOptions {
   /// Error that pose estimation accepts, pixels, (0, 100]; twice as much while intrinsics are not
   /// known.
   double max_pose_error_px = 4.0;
-  /// Scale of the robust loss in bundle adjustment, pixels, (0, 100].
-  double loss_scale_px = 1.0;
+  /// Scale of the robust loss in bundle adjustment, in pixels of a keypoint found at scale 2, (0,
+  /// 100].
+  double loss_scale_px = 0.5;
   /// A view needs this many landmarks seen under `min_view_parallax_deg` by its map to count as
   /// supported, [6, 1000].
   int min_supported_landmarks = 15;

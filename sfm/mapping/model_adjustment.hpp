@@ -3,6 +3,7 @@
 #include <span>
 #include <vector>
 
+#include "firmware/base/executor.hpp"
 #include "sfm/mapping/bundle_adjustment.hpp"
 #include "sfm/mapping/map.hpp"
 #include "sfm/mapping/mapper.hpp"
@@ -13,9 +14,11 @@ namespace trigmesh {
 /// model.
 class ModelAdjustment {
  public:
-  /// Both outlive the object; `sigmas_px[view][feature]` grows as views are added.
-  ModelAdjustment(const MapperOptions& options, const std::vector<std::vector<float>>& sigmas_px)
-      : options_(&options), sigmas_px_(&sigmas_px) {}
+  /// All outlive the object; `sigmas_px[view][feature]` grows as views are added.
+  ModelAdjustment(const MapperOptions& options,
+                  const std::vector<std::vector<float>>& sigmas_px,
+                  Executor& executor)
+      : options_(&options), sigmas_px_(&sigmas_px), executor_(&executor) {}
 
   void add_camera(const Camera& prior, IntrinsicsKnowledge knowledge);
 
@@ -40,6 +43,7 @@ class ModelAdjustment {
 
   const MapperOptions* options_;
   const std::vector<std::vector<float>>* sigmas_px_;
+  Executor* executor_;
   std::vector<Knowledge> cameras_;
 };
 

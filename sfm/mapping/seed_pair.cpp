@@ -26,7 +26,8 @@ constexpr double kLensSlack = 2.0;
 std::vector<const PairRecord*> strongest_free_pairs(const ImageStore& store) {
   std::vector<const PairRecord*> pairs;
   for (const PairRecord& record : store.pairs) {
-    const bool usable = record.geometry.kind == TwoViewKind::kGeneral || record.geometry.kind == TwoViewKind::kPlanar;
+    const bool usable = record.geometry.kind == TwoViewKind::kGeneral ||
+                        record.geometry.kind == TwoViewKind::kPlanar;
     const bool free = !store.images[index(record.pair.first)].registered &&
                       !store.images[index(record.pair.second)].registered;
     if (usable && free) {
@@ -54,15 +55,19 @@ struct SeedMatches {
 };
 
 /// An even choice of at most kMaxMatchesJudged matches.
-SeedMatches collect_matches(const ImageStore& store, const PairRecord& record, const Camera& first, const Camera& second) {
+SeedMatches collect_matches(const ImageStore& store,
+                            const PairRecord& record,
+                            const Camera& first,
+                            const Camera& second) {
   const std::vector<FeatureMatch>& inliers = record.geometry.inliers;
   const std::size_t step = std::max<std::size_t>(1, inliers.size() / kMaxMatchesJudged);
   SeedMatches matches;
   for (std::size_t i = 0; i < inliers.size(); i += step) {
     const Eigen::Vector2d first_px =
         store.images[index(record.pair.first)].keypoints_px[index(inliers[i].first)].cast<double>();
-    const Eigen::Vector2d second_px =
-        store.images[index(record.pair.second)].keypoints_px[index(inliers[i].second)].cast<double>();
+    const Eigen::Vector2d second_px = store.images[index(record.pair.second)]
+                                          .keypoints_px[index(inliers[i].second)]
+                                          .cast<double>();
     const auto first_ray = normalize_pixel(first, first_px);
     const auto second_ray = normalize_pixel(second, second_px);
     if (first_ray && second_ray) {
@@ -75,25 +80,31 @@ SeedMatches collect_matches(const ImageStore& store, const PairRecord& record, c
   return matches;
 }
 
-/// E = K2^T F K1, decomposed, the pose with points in front of both cameras, refined on the Sampson error.
+/// E = K2^T F K1, decomposed, the pose with points in front of both cameras, refined on the Sampson
+/// error.
 std::optional<Rigid3> relative_pose(const Eigen::Matrix3d& fundamental,
                                     const SeedMatches& matches,
                                     const CalibrationPair& calibrations) {
-  const Eigen::Matrix3d essential =
-      enforce_essential(essential_from_fundamental(fundamental, calibrations.first, calibrations.second));
+  const Eigen::Matrix3d essential = enforce_essential(
+      essential_from_fundamental(fundamental, calibrations.first, calibrations.second));
   const PoseChoice choice = choose_pose(essential, matches.first, matches.second, {}, {});
   if (choice.outcome != CheiralityOutcome::kOk) {
     return std::nullopt;
   }
-  const auto straight = [](const Eigen::Matrix3d& calibration, const std::vector<Eigen::Vector2d>& rays) {
+  const auto straight = [](const Eigen::Matrix3d& calibration,
+                           const std::vector<Eigen::Vector2d>& rays) {
     std::vector<Eigen::Vector2d> pixels;
     for (const Eigen::Vector2d& ray : rays) {
       pixels.emplace_back((calibration * ray.homogeneous()).hnormalized());
     }
     return pixels;
   };
-  return refine_relative_pose(choice.second_from_first, calibrations, straight(calibrations.first, matches.first),
-                              straight(calibrations.second, matches.second), {}, {});
+  return refine_relative_pose(choice.second_from_first,
+                              calibrations,
+                              straight(calibrations.first, matches.first),
+                              straight(calibrations.second, matches.second),
+                              {},
+                              {});
 }
 
 std::vector<double> triangulation_angles(const SeedMatches& matches,
@@ -126,13 +137,15 @@ std::optional<ScoredSeed> judge(const ImageStore& store,
   const Camera& first = cameras[index(store.images[index(record.pair.first)].camera)];
   const Camera& second = cameras[index(store.images[index(record.pair.second)].camera)];
   const SeedMatches matches = collect_matches(store, record, first, second);
-  const auto pose = relative_pose(record.geometry.fundamental, matches,
+  const auto pose = relative_pose(record.geometry.fundamental,
+                                  matches,
                                   {first.calibration_matrix(), second.calibration_matrix()});
   if (!pose) {
     return std::nullopt;
   }
   std::vector<double> angles = triangulation_angles(matches, first, second, *pose, options);
-  const double part = static_cast<double>(record.geometry.inliers.size()) / static_cast<double>(matches.first.size());
+  const double part = static_cast<double>(record.geometry.inliers.size()) /
+                      static_cast<double>(matches.first.size());
   const auto landmarks = static_cast<std::size_t>(part * static_cast<double>(angles.size()));
   if (angles.empty() || landmarks < static_cast<std::size_t>(options.min_seed_landmarks)) {
     return std::nullopt;
@@ -154,7 +167,8 @@ std::optional<SeedPair> choose_seed_pair(const ImageStore& store,
                                          Executor& executor) {
   const std::vector<const PairRecord*> pairs = strongest_free_pairs(store);
   std::vector<std::optional<ScoredSeed>> seeds(pairs.size());
-  executor.for_each_index(pairs.size(), [&](std::size_t i) { seeds[i] = judge(store, *pairs[i], cameras, options); });
+  executor.for_each_index(
+      pairs.size(), [&](std::size_t i) { seeds[i] = judge(store, *pairs[i], cameras, options); });
   const ScoredSeed* best = nullptr;
   for (const std::optional<ScoredSeed>& seed : seeds) {
     if (seed && (best == nullptr || seed->score > best->score)) {

@@ -62,11 +62,14 @@ double visibility_score(const Map& map, ViewId view) {
     std::vector<char> hit(static_cast<std::size_t>(cells * cells), 0);
     for (const Map::Candidate& candidate : candidates) {
       const Eigen::Vector2d pixel = map.pixel({view, candidate.feature});
-      const int column = std::clamp(static_cast<int>(pixel.x() * cells / camera.width_px), 0, cells - 1);
-      const int row = std::clamp(static_cast<int>(pixel.y() * cells / camera.height_px), 0, cells - 1);
+      const int column =
+          std::clamp(static_cast<int>(pixel.x() * cells / camera.width_px), 0, cells - 1);
+      const int row =
+          std::clamp(static_cast<int>(pixel.y() * cells / camera.height_px), 0, cells - 1);
       hit[static_cast<std::size_t>(row * cells + column)] = 1;
     }
-    score += static_cast<double>(cells) * static_cast<double>(std::count(hit.begin(), hit.end(), 1));
+    score +=
+        static_cast<double>(cells) * static_cast<double>(std::count(hit.begin(), hit.end(), 1));
   }
   return score;
 }

@@ -1,13 +1,13 @@
 #include "tools/trigmesh/interrupt.hpp"
 
+#include <array>
+#include <cstdint>
+
 #include <poll.h>
 #include <pthread.h>
 #include <sys/eventfd.h>
 #include <sys/signalfd.h>
 #include <unistd.h>
-
-#include <array>
-#include <cstdint>
 
 #include "firmware/base/check.hpp"
 
@@ -41,7 +41,8 @@ void InterruptWatch::wait() {
       return;
     }
     signalfd_siginfo info;
-    if ((watched[0].revents & POLLIN) != 0 && ::read(signal_fd_, &info, sizeof(info)) == sizeof(info)) {
+    if ((watched[0].revents & POLLIN) != 0 &&
+        ::read(signal_fd_, &info, sizeof(info)) == sizeof(info)) {
       interrupted_.request_stop();
       watched[0].fd = -1;
       // From now on a signal takes its default action, in this thread.

@@ -1,14 +1,14 @@
 #pragma once
 
-#include <signal.h>
-
 #include <stop_token>
 #include <thread>
 
+#include <signal.h>
+
 namespace trigmesh {
 
-/// Turns the first SIGINT or SIGTERM into a stop request; a second one ends the program at once. Made in the main thread
-/// before other threads start: they inherit its blocked signals.
+/// Turns the first SIGINT or SIGTERM into a stop request; a second one ends the program at once.
+/// Made in the main thread before other threads start: they inherit its blocked signals.
 class InterruptWatch {
  public:
   InterruptWatch();
