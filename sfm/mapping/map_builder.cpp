@@ -198,11 +198,14 @@ bool MapBuilder::refine() {
 }
 
 void MapBuilder::finish() {
+  MapperOptions strict_options = *options_;
+  strict_options.max_reprojection_px = options_->final_reprojection_px;
+  const Structure strict(store_->tracks, strict_options, *executor_);
   for (int round = 0; round < kFinalRounds; ++round) {
-    const std::size_t completed = structure_.complete(map_);
-    const std::size_t added = structure_.triangulate_all(map_);
+    const std::size_t completed = strict.complete(map_);
+    const std::size_t added = strict.triangulate_all(map_);
     adjustment().adjust_all(map_);
-    const Structure::FilterReport filtered = structure_.filter(map_, options_->max_reprojection_px);
+    const Structure::FilterReport filtered = strict.filter(map_, options_->final_reprojection_px);
     const std::size_t changed = filtered.removed_observations + completed + 2 * added;
     if (static_cast<double>(changed) <
         kSettledRatio * static_cast<double>(observation_count(map_))) {

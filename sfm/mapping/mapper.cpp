@@ -49,6 +49,9 @@ Result<> MapperOptions::validate() const {
   if (!(max_reprojection_px > 0.0 && max_reprojection_px <= 100.0)) {
     return refuse("max_reprojection_px", max_reprojection_px, "(0, 100]");
   }
+  if (!(final_reprojection_px > 0.0 && final_reprojection_px <= 100.0)) {
+    return refuse("final_reprojection_px", final_reprojection_px, "(0, 100]");
+  }
   if (!(max_pose_error_px > 0.0 && max_pose_error_px <= 100.0)) {
     return refuse("max_pose_error_px", max_pose_error_px, "(0, 100]");
   }

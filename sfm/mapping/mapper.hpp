@@ -31,8 +31,11 @@ struct MapperOptions {
   /// Smallest angle between two rays of a landmark, degrees, (0, 30]. Below about 1 degree depth is
   /// noise.
   double min_triangulation_angle_deg = 1.5;
-  /// Reprojection error above which an observation is refused, pixels, (0, 100].
+  /// Reprojection error above which an observation is refused while the model grows, pixels, (0,
+  /// 100].
   double max_reprojection_px = 4.0;
+  /// The same in the last adjustments, when poses and intrinsics are settled, pixels, (0, 100].
+  double final_reprojection_px = 2.0;
   /// Error that pose estimation accepts, pixels, (0, 100]; twice as much while intrinsics are not
   /// known.
   double max_pose_error_px = 4.0;
