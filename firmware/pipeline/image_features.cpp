@@ -13,14 +13,40 @@ namespace trigmesh {
 
 namespace {
 
+// A keypoint sits on the darkest or brightest spot of a blob; its surroundings tell the colour of
+// the surface.
+constexpr double kColorRadiusInScales = 2.0;
+constexpr int kMaxColorRadiusPx = 6;
+
+Rgb mean_color(const cv::Mat& rgb, const Keypoint& keypoint) {
+  const int x = static_cast<int>(std::lround(keypoint.x_px));
+  const int y = static_cast<int>(std::lround(keypoint.y_px));
+  const int radius =
+      std::min(kMaxColorRadiusPx,
+               static_cast<int>(std::lround(kColorRadiusInScales * double{keypoint.scale_px})));
+  std::array<int, 3> sum{};
+  int count = 0;
+  for (int row = std::max(0, y - radius); row <= std::min(rgb.rows - 1, y + radius); ++row) {
+    const std::uint8_t* line = rgb.ptr<std::uint8_t>(row);
+    for (int column = std::max(0, x - radius); column <= std::min(rgb.cols - 1, x + radius);
+         ++column) {
+      for (std::size_t c = 0; c < 3; ++c) {
+        sum[c] += line[3 * static_cast<std::size_t>(column) + c];
+      }
+      ++count;
+    }
+  }
+  const auto channel = [&](std::size_t c) {
+    return static_cast<std::uint8_t>(count > 0 ? (sum[c] + count / 2) / count : 0);
+  };
+  return {channel(0), channel(1), channel(2)};
+}
+
 std::vector<Rgb> sample_colors(const cv::Mat& rgb, const std::vector<Keypoint>& keypoints) {
   std::vector<Rgb> colors;
   colors.reserve(keypoints.size());
   for (const Keypoint& keypoint : keypoints) {
-    const int x = std::clamp(static_cast<int>(std::lround(keypoint.x_px)), 0, rgb.cols - 1);
-    const int y = std::clamp(static_cast<int>(std::lround(keypoint.y_px)), 0, rgb.rows - 1);
-    const std::uint8_t* pixel = rgb.ptr<std::uint8_t>(y) + std::ptrdiff_t{3} * x;
-    colors.push_back({pixel[0], pixel[1], pixel[2]});
+    colors.push_back(mean_color(rgb, keypoint));
   }
   return colors;
 }

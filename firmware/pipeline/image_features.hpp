@@ -22,7 +22,7 @@ struct ImageFeatures {
                            ///< may be empty
   double exif_focal_px = 0.0;  ///< focal length that EXIF tells; 0 when it tells none
   FeatureSet features;
-  std::vector<Rgb> colors;  ///< per keypoint, the pixel under it
+  std::vector<Rgb> colors;  ///< per keypoint, the mean around it
 };
 
 /// Bytes for a checkpoint and back. Decoding anything else gives kCorruptData.

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -79,7 +80,7 @@ Result<ReconstructionOptions> options_from(const ReconstructArguments& arguments
                             : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   options.memory_limit_bytes = arguments.memory_limit_bytes;
   options.seed = arguments.seed;
-  options.software_version = "trigmesh " TRIGMESH_VERSION;
+  options.software_version = TRIGMESH_VERSION;
   if (!arguments.camera_file.empty()) {
     TM_ASSIGN_OR_RETURN(const std::vector<CameraProfile> profiles,
                         read_camera_file(arguments.camera_file));
