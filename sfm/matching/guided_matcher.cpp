@@ -150,7 +150,9 @@ GuidedScan scan_near_lines(const GuidedImage& first,
   const double limit = max_error_px * max_error_px;
   GuidedScan scan{.rows = std::vector<NearestTwo>(first.index.size()),
                   .columns = std::vector<NearestTwo>(second.index.size())};
-  std::vector<std::uint32_t> candidates(second.index.size());
+  // One place more than points: the place after the last is written too.
+  std::vector<std::uint32_t> candidates(second.index.size() + 1);
+  std::vector<double> squared_errors(second.index.size() + 1);
   std::vector<std::int32_t> scores(second.index.size());
   for (std::size_t i = 0; i < first.index.size(); ++i) {
     const Eigen::Vector2d& point = first.points_px[i];
@@ -161,16 +163,22 @@ GuidedScan scan_near_lines(const GuidedImage& first,
     const double line_limit = limit * line.head<2>().squaredNorm();
     const Eigen::Matrix2d back = fundamental.topLeftCorner<2, 2>().transpose();
     const Eigen::Vector2d back_offset = fundamental.row(2).head<2>().transpose();
-    std::size_t count = 0;
-    strips[std::abs(line.y()) >= std::abs(line.x()) ? 0 : 1].visit_line(
+    // Both tests write first and count after, without a branch that could not be predicted.
+    std::size_t near_line = 0;
+    const int along = std::abs(line.y()) >= std::abs(line.x()) ? 0 : 1;
+    strips[along].visit_line(
         line, max_error_px, [&](const Eigen::Vector2d& other, std::uint32_t j) {
           const double error = line.x() * other.x() + line.y() * other.y() + line.z();
-          const double squared = error * error;
-          const bool near = squared <= line_limit &&
-                            squared <= limit * (back * other + back_offset).squaredNorm();
-          candidates[count] = j;
-          count += near ? 1U : 0U;
+          candidates[near_line] = j;
+          squared_errors[near_line] = error * error;
+          near_line += static_cast<std::size_t>(error * error <= line_limit);
         });
+    std::size_t count = 0;
+    for (std::size_t c = 0; c < near_line; ++c) {
+      const Eigen::Vector2d gradient = back * second.points_px[candidates[c]] + back_offset;
+      candidates[count] = candidates[c];
+      count += static_cast<std::size_t>(squared_errors[c] <= limit * gradient.squaredNorm());
+    }
     internal::similarities(first.index.rows(),
                            i,
                            second.index.rows(),
