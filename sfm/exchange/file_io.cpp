@@ -12,38 +12,12 @@
 #include <unistd.h>
 
 #include "firmware/base/check.hpp"
+#include "firmware/base/unique_fd.hpp"
 
 namespace trigmesh {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Owns a file descriptor.
-class UniqueFd {
- public:
-  explicit UniqueFd(int fd) : fd_(fd) {}
-
-  UniqueFd(const UniqueFd&) = delete;
-  UniqueFd& operator=(const UniqueFd&) = delete;
-  UniqueFd(UniqueFd&&) = delete;
-  UniqueFd& operator=(UniqueFd&&) = delete;
-
-  ~UniqueFd() {
-    if (fd_ >= 0) {
-      (void)::close(fd_);  // nothing can be done about a failure here
-    }
-  }
-
-  [[nodiscard]] int get() const { return fd_; }
-
-  [[nodiscard]] bool valid() const { return fd_ >= 0; }
-
-  /// 0, or the errno of close, which may report a delayed write error.
-  [[nodiscard]] int close() { return ::close(std::exchange(fd_, -1)) == 0 ? 0 : errno; }
-
- private:
-  int fd_;
-};
 
 tl::unexpected<Error> system_failure(int error_number,
                                      std::string_view attempt,
@@ -120,56 +94,6 @@ Result<> replace_in_two_steps(const fs::path& staged, const fs::path& target) {
 }
 
 }  // namespace
-
-Error system_error(int error_number, std::string_view attempt, const fs::path& path) {
-  ErrorCode code = ErrorCode::kIo;
-  if (error_number == ENOSPC || error_number == EDQUOT) {
-    code = ErrorCode::kNoSpace;
-  } else if (error_number == ENOENT || error_number == ENOTDIR) {
-    code = ErrorCode::kNotFound;
-  }
-  return {code,
-          fmt::format(
-              "{} {}: {}", attempt, path.string(), std::generic_category().message(error_number))};
-}
-
-Result<std::string> read_file(const fs::path& path, std::size_t max_bytes) {
-  const UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-  if (!fd.valid()) {
-    return system_failure(errno, "cannot open", path);
-  }
-
-  struct stat status {};
-
-  if (::fstat(fd.get(), &status) != 0) {
-    return system_failure(errno, "cannot read", path);
-  }
-  // The size is a hint only: the file may grow, and devices and pipes have none.
-  std::string bytes;
-  if (S_ISREG(status.st_mode)) {
-    bytes.reserve(std::min(static_cast<std::size_t>(status.st_size), max_bytes));
-  }
-  std::array<char, std::size_t{1} << 16> chunk;
-  while (true) {
-    const ssize_t got = ::read(fd.get(), chunk.data(), chunk.size());
-    if (got < 0 && errno == EINTR) {
-      continue;
-    }
-    if (got < 0) {
-      return system_failure(errno, "cannot read", path);
-    }
-    if (got == 0) {
-      return bytes;
-    }
-    if (static_cast<std::size_t>(got) > max_bytes - bytes.size()) {
-      return fail(ErrorCode::kLimitExceeded,
-                  "cannot read {}: it is longer than {} bytes",
-                  path.string(),
-                  max_bytes);
-    }
-    bytes.append(chunk.data(), static_cast<std::size_t>(got));
-  }
-}
 
 Result<> write_file_atomically(const fs::path& path, std::string_view bytes) {
   const fs::path part = path.parent_path() / fmt::format(".{}.part", path.filename().string());

@@ -6,17 +6,13 @@
 #include <string>
 #include <string_view>
 
+#include "firmware/base/file_bytes.hpp"
 #include "firmware/base/result.hpp"
 
 namespace trigmesh {
 
 /// The largest model file that is read into memory unless the caller says otherwise.
 inline constexpr std::size_t kMaxModelFileBytes = std::size_t{1} << 30;
-
-/// The whole file as bytes. kNotFound when it does not exist, kLimitExceeded when it is longer than
-/// `max_bytes`, kIo otherwise; the message has the path and the system's reason.
-[[nodiscard]] Result<std::string> read_file(const std::filesystem::path& path,
-                                            std::size_t max_bytes);
 
 /// Replaces the file or leaves it as it was: writes `.NAME.part` beside it, fsyncs, renames. After
 /// a failure the part file is gone. kNoSpace for a full disk or quota, kIo otherwise (missing
@@ -34,10 +30,5 @@ inline constexpr std::size_t kMaxModelFileBytes = std::size_t{1} << 30;
 /// and put back when the second step fails.
 [[nodiscard]] Result<> replace_directory(const std::filesystem::path& staged,
                                          const std::filesystem::path& target);
-
-/// What a failed system call means to us. `attempt` reads "cannot write".
-[[nodiscard]] Error system_error(int error_number,
-                                 std::string_view attempt,
-                                 const std::filesystem::path& path);
 
 }  // namespace trigmesh

@@ -56,7 +56,7 @@ Result<FolderContents> list_folder(const fs::path& folder, std::size_t max_frame
     if (is_hidden(name)) {
       continue;
     }
-    if (!format || entry->is_directory(type_error) || !is_safe_frame_name(name)) {
+    if (!format || !entry->is_regular_file(type_error) || !is_safe_frame_name(name)) {
       contents.ignored.push_back(name);
     } else {
       contents.frames.push_back({name, entry->path(), std::nullopt, *format});
@@ -124,10 +124,9 @@ Result<FolderContents> list_recording(const fs::path& folder, const RecordingOpt
   if (!fs::exists(table, error)) {
     return contents;
   }
-  TM_ASSIGN_OR_RETURN(const std::vector<std::uint8_t> bytes,
-                      read_file_bytes(table, options.max_table_bytes));
+  TM_ASSIGN_OR_RETURN(const std::string text, read_file(table, options.max_table_bytes));
   TM_ASSIGN_OR_RETURN(const std::vector<TimestampRow> rows,
-                      parse_timestamps(as_text(bytes), table.string(), options.max_frames));
+                      parse_timestamps(text, table.string(), options.max_frames));
   return order_by_time(std::move(contents), rows, images);
 }
 
@@ -136,10 +135,9 @@ Result<FolderContents> list_from_file(const fs::path& list, const RecordingOptio
     return fail(
         ErrorCode::kUnsupported, "{} is a single picture; {}", list.string(), kWhatIsAccepted);
   }
-  TM_ASSIGN_OR_RETURN(const std::vector<std::uint8_t> bytes,
-                      read_file_bytes(list, options.max_table_bytes));
+  TM_ASSIGN_OR_RETURN(const std::string text, read_file(list, options.max_table_bytes));
   TM_ASSIGN_OR_RETURN(const std::vector<std::string> paths,
-                      parse_frame_list(as_text(bytes), list.string(), options.max_frames));
+                      parse_frame_list(text, list.string(), options.max_frames));
   FolderContents contents;
   for (const std::string& path : paths) {
     const std::optional<FrameFormat> format = format_of(path);

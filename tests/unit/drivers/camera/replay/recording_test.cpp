@@ -5,6 +5,7 @@
 #include <system_error>
 #include <vector>
 
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <gmock/gmock.h>
@@ -59,6 +60,16 @@ TEST_F(RecordingTest, ListsPhotographsInNaturalOrderAndCountsTheRest) {
   EXPECT_THAT(recording->ignored(), ElementsAre("notes.txt"));
   EXPECT_EQ(recording->frames()[2].format, FrameFormat::kPng);
   EXPECT_FALSE(recording->frames()[0].timestamp);
+}
+
+TEST_F(RecordingTest, DoesNotWaitForAPipeNamedLikeAPicture) {
+  write("a.jpg");
+  fs::create_directory(root_ / "folder.jpg");
+  ASSERT_EQ(mkfifo((root_ / "pipe.jpg").c_str(), 0600), 0);
+  const auto recording = Recording::open(root_);
+  ASSERT_TRUE(recording) << recording.error().message;
+  EXPECT_THAT(names(*recording), ElementsAre("a.jpg"));
+  EXPECT_THAT(recording->ignored(), ElementsAre("folder.jpg", "pipe.jpg"));
 }
 
 TEST_F(RecordingTest, OrdersRecordingByTimestamp) {
