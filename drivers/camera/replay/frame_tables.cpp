@@ -2,6 +2,8 @@
 
 #include <charconv>
 #include <cstdint>
+#include <limits>
+#include <optional>
 #include <set>
 #include <system_error>
 #include <utility>
@@ -12,7 +14,6 @@ namespace trigmesh {
 namespace {
 
 constexpr std::size_t kMaxLineBytes = 4096;
-constexpr std::string_view kTimestampHeader = "name,timestamp_ns";
 
 bool is_digit(char c) {
   return c >= '0' && c <= '9';
@@ -63,33 +64,80 @@ bool has_control_character(std::string_view text) {
   return false;
 }
 
+/// Unit of the second column.
+enum class TimeColumn { kNanoseconds, kSeconds };
+
+/// The header's first two columns decide; further ones are for others.
+std::optional<TimeColumn> time_column(std::string_view header) {
+  const std::size_t first = header.find(',');
+  const std::size_t second = header.find(',', first + 1);
+  if (first == std::string_view::npos || header.substr(0, first) != "name") {
+    return std::nullopt;
+  }
+  const std::string_view unit =
+      header.substr(first + 1, second == std::string_view::npos ? second : second - first - 1);
+  if (unit == "timestamp_ns") {
+    return TimeColumn::kNanoseconds;
+  }
+  return unit == "timestamp_s" ? std::optional(TimeColumn::kSeconds) : std::nullopt;
+}
+
+std::optional<std::int64_t> whole_number(std::string_view text) {
+  std::int64_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const bool whole =
+      error == std::errc{} && end == text.data() + text.size() && is_digit(text.front());
+  return whole ? std::optional(value) : std::nullopt;
+}
+
+/// Seconds with up to nine decimals, exactly: no floating point.
+std::optional<std::int64_t> nanoseconds_from_seconds(std::string_view text) {
+  constexpr std::size_t kDecimals = 9;
+  constexpr std::int64_t kPerSecond = 1'000'000'000;
+  const std::size_t point = text.find('.');
+  std::string decimals(point == std::string_view::npos ? std::string_view()
+                                                       : text.substr(point + 1));
+  if (decimals.size() > kDecimals || (point != std::string_view::npos && decimals.empty())) {
+    return std::nullopt;
+  }
+  decimals.resize(kDecimals, '0');
+  const auto seconds = whole_number(text.substr(0, point));
+  const auto rest = whole_number(decimals);
+  if (!seconds || !rest || *seconds >= std::numeric_limits<std::int64_t>::max() / kPerSecond) {
+    return std::nullopt;
+  }
+  return *seconds * kPerSecond + *rest;
+}
+
 Result<TimestampRow> parse_timestamp_row(std::string_view line,
+                                         TimeColumn column,
                                          std::string_view file,
                                          std::size_t number) {
   const std::size_t comma = line.find(',');
-  if (comma == std::string_view::npos || line.find(',', comma + 1) != std::string_view::npos) {
-    return fail(ErrorCode::kCorruptData,
-                "{}:{}: expected two columns, name and timestamp_ns",
-                file,
-                number);
+  if (comma == std::string_view::npos) {
+    return fail(
+        ErrorCode::kCorruptData, "{}:{}: expected a name, a comma and a timestamp", file, number);
   }
   const std::string_view name = line.substr(0, comma);
-  const std::string_view value = line.substr(comma + 1);
+  std::string_view value = line.substr(comma + 1);
+  value = value.substr(0, value.find(','));
   if (!is_safe_frame_name(name)) {
     return fail(ErrorCode::kCorruptData,
                 "{}:{}: the name must be a relative path below images/ without control characters",
                 file,
                 number);
   }
-  std::int64_t nanoseconds = 0;
-  const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), nanoseconds);
-  if (error != std::errc{} || end != value.data() + value.size() || nanoseconds < 0) {
+  const auto nanoseconds =
+      column == TimeColumn::kSeconds ? nanoseconds_from_seconds(value) : whole_number(value);
+  if (!nanoseconds) {
     return fail(ErrorCode::kCorruptData,
-                "{}:{}: the timestamp must be a whole number of nanoseconds, 0 or more",
+                "{}:{}: the timestamp must be {}, 0 or more",
                 file,
-                number);
+                number,
+                column == TimeColumn::kSeconds ? "seconds with at most nine decimals"
+                                               : "a whole number of nanoseconds");
   }
-  return TimestampRow{std::string(name), std::chrono::nanoseconds(nanoseconds)};
+  return TimestampRow{std::string(name), std::chrono::nanoseconds(*nanoseconds)};
 }
 
 tl::unexpected<Error> too_many_rows(std::string_view file, std::size_t max_rows) {
@@ -103,9 +151,11 @@ Result<std::vector<TimestampRow>> parse_timestamps(std::string_view text,
                                                    std::string_view file,
                                                    std::size_t max_rows) {
   LineCursor cursor(text);
-  if (!cursor.advance() || cursor.line() != kTimestampHeader) {
-    return fail(
-        ErrorCode::kCorruptData, "{}:1: the first line must be '{}'", file, kTimestampHeader);
+  const auto column = cursor.advance() ? time_column(cursor.line()) : std::nullopt;
+  if (!column) {
+    return fail(ErrorCode::kCorruptData,
+                "{}:1: the first line must begin with 'name,timestamp_ns' or 'name,timestamp_s'",
+                file);
   }
   std::vector<TimestampRow> rows;
   std::set<std::string, std::less<>> seen;
@@ -124,7 +174,7 @@ Result<std::vector<TimestampRow>> parse_timestamps(std::string_view text,
       return too_many_rows(file, max_rows);
     }
     TM_ASSIGN_OR_RETURN(TimestampRow row,
-                        parse_timestamp_row(cursor.line(), file, cursor.number()));
+                        parse_timestamp_row(cursor.line(), *column, file, cursor.number()));
     if (!seen.insert(row.name).second) {
       return fail(
           ErrorCode::kCorruptData, "{}:{}: '{}' is listed twice", file, cursor.number(), row.name);

@@ -18,10 +18,11 @@ struct TimestampRow {
   bool operator==(const TimestampRow&) const = default;
 };
 
-/// Reads timestamps.csv: the header `name,timestamp_ns`, then one row a frame: a name without
-/// comma, a non-negative decimal integer. Lines end with LF or CRLF; empty lines are skipped; there
-/// is no quoting. `file` is for messages. kCorruptData with file, line and reason: other header,
-/// other number of columns, not a number, a name that is unsafe (see is_safe_frame_name) or given
+/// Reads timestamps.csv: a header that begins with `name,timestamp_ns` or `name,timestamp_s`, then
+/// one row a frame: a name without comma, and whole nanoseconds or seconds with up to nine
+/// decimals, 0 or more. Further columns are not looked at. Lines end with LF or CRLF; empty lines
+/// are skipped; there is no quoting. `file` is for messages. kCorruptData with file, line and
+/// reason: other header, not a number, a name that is unsafe (see is_safe_frame_name) or given
 /// twice; kLimitExceeded: more than `max_rows`.
 [[nodiscard]] Result<std::vector<TimestampRow>> parse_timestamps(std::string_view text,
                                                                  std::string_view file,

@@ -62,6 +62,15 @@ TEST(ParseTimestamps, AcceptsWindowsLineEndsAndByteOrderMark) {
   EXPECT_THAT(*rows, ElementsAre(TimestampRow{"a.jpg", nanoseconds(7)}));
 }
 
+TEST(ParseTimestamps, ReadsSecondsExactlyAndIgnoresFurtherColumns) {
+  const auto rows = parse_timestamps(
+      "name,timestamp_s,repeated\na.jpg,1305031229.528748,0\nb.jpg,2,1\n", "t.csv", kManyRows);
+  ASSERT_TRUE(rows) << rows.error().message;
+  EXPECT_THAT(*rows,
+              ElementsAre(TimestampRow{"a.jpg", nanoseconds(1305031229528748000)},
+                          TimestampRow{"b.jpg", nanoseconds(2000000000)}));
+}
+
 struct BadTable {
   const char* text;
   const char* place;
@@ -82,7 +91,10 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(BadTable{"", "t.csv:1"},
                       BadTable{"a.jpg,1\n", "t.csv:1"},
                       BadTable{"name,timestamp_ns\na.jpg\n", "t.csv:2"},
-                      BadTable{"name,timestamp_ns\na.jpg,1,2\n", "t.csv:2"},
+                      BadTable{"name,timestamp_ms\na.jpg,1\n", "t.csv:1"},
+                      BadTable{"name,timestamp_s\na.jpg,1.0123456789\n", "t.csv:2"},
+                      BadTable{"name,timestamp_s\na.jpg,1.\n", "t.csv:2"},
+                      BadTable{"name,timestamp_s\na.jpg,9999999999.0\n", "t.csv:2"},
                       BadTable{"name,timestamp_ns\na.jpg,1\nb.jpg,x\n", "t.csv:3"},
                       BadTable{"name,timestamp_ns\na.jpg,-1\n", "t.csv:2"},
                       BadTable{"name,timestamp_ns\na.jpg,1.5\n", "t.csv:2"},
