@@ -5,125 +5,105 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <numeric>
 
 #include <Eigen/Geometry>
 
 #include "firmware/base/check.hpp"
+#include "sfm/matching/line_kernel.hpp"
 
 namespace trigmesh {
 namespace {
 
+using internal::LineGate;
 using internal::NearestTwo;
+using internal::PointStrips;
 
-/// Points sorted into strips across one axis, and by the other coordinate within a strip: the
-/// points of a strip near a line are one run in memory.
-class PointStrips {
- public:
-  /// `along`: 0 for strips that follow each other in x, 1 for y. Points that are not finite are
-  /// left out.
-  PointStrips(std::span<const Eigen::Vector2d> points, int along) : along_(along) {
-    double low[2] = {std::numeric_limits<double>::max(), std::numeric_limits<double>::max()};
-    double high[2] = {std::numeric_limits<double>::lowest(), std::numeric_limits<double>::lowest()};
-    for (const Eigen::Vector2d& point : points) {
-      if (!point.allFinite()) {
-        continue;
-      }
-      for (const int axis : {0, 1}) {
-        low[axis] = std::min(low[axis], point[axis]);
-        high[axis] = std::max(high[axis], point[axis]);
-      }
-    }
-    if (low[0] > high[0]) {
-      return;
-    }
-    const auto cells = [&](int axis, double least_px, double& cell_px) {
-      cell_px = std::max(least_px, (high[axis] - low[axis]) / kMostCells);
-      return static_cast<int>((high[axis] - low[axis]) / cell_px) + 1;
-    };
-    strip_begin_px_ = low[along];
-    cell_begin_px_ = low[1 - along];
-    strips_ = cells(along, kStripPx, strip_px_);
-    cells_ = cells(1 - along, kCellPx, cell_px_);
-    sort(points);
-  }
+constexpr double kStripPx = 64.0;
+constexpr double kCellPx = 8.0;
+/// On a side, however large the image.
+constexpr double kMostCells = 512.0;
 
-  /// Calls visit(point, point index) for all points within `margin_px` of the line l . (x, y, 1) =
-  /// 0, and some others near it. The line must be nearer to the axis `along`.
-  template <typename Visit>
-  void visit_line(const Eigen::Vector3d& line, double margin_px, const Visit& visit) const {
-    const double slope = -line[along_] / line[1 - along_];
-    const double offset = -line.z() / line[1 - along_];
-    if (!std::isfinite(slope) || !std::isfinite(offset)) {
-      return;
-    }
-    const double margin =
-        margin_px * std::sqrt(1.0 + slope * slope) + 0.5 * std::abs(slope) * strip_px_;
-    const double step = slope * strip_px_ / cell_px_;
-    const double half = margin / cell_px_;
-    double middle =
-        (slope * (strip_begin_px_ + 0.5 * strip_px_) + offset - cell_begin_px_) / cell_px_;
-    for (int strip = 0; strip < strips_; ++strip, middle += step) {
-      if (middle + half < 0.0 || middle - half >= cells_) {
-        continue;
-      }
-      const int low = std::max(0, static_cast<int>(middle - half));
-      const int high = std::min(cells_ - 1, static_cast<int>(middle + half));
-      const std::size_t row = static_cast<std::size_t>(strip) * static_cast<std::size_t>(cells_);
-      const std::uint32_t end = starts_[row + static_cast<std::size_t>(high) + 1];
-      for (std::uint32_t k = starts_[row + static_cast<std::size_t>(low)]; k < end; ++k) {
-        visit(points_[k], members_[k]);
-      }
-    }
-  }
-
- private:
-  static constexpr double kStripPx = 32.0;
-  static constexpr double kCellPx = 8.0;
-  static constexpr double kMostCells = 512.0;
-
-  [[nodiscard]] std::size_t cell_of(const Eigen::Vector2d& point) const {
-    const int strip =
-        std::clamp(static_cast<int>((point[along_] - strip_begin_px_) / strip_px_), 0, strips_ - 1);
-    const int cell = std::clamp(
-        static_cast<int>((point[1 - along_] - cell_begin_px_) / cell_px_), 0, cells_ - 1);
-    return static_cast<std::size_t>(strip) * static_cast<std::size_t>(cells_) +
-           static_cast<std::size_t>(cell);
-  }
-
-  /// Counting sort.
-  void sort(std::span<const Eigen::Vector2d> points) {
-    starts_.assign(static_cast<std::size_t>(strips_) * static_cast<std::size_t>(cells_) + 1, 0);
-    for (const Eigen::Vector2d& point : points) {
-      if (point.allFinite()) {
-        ++starts_[cell_of(point) + 1];
-      }
-    }
-    for (std::size_t c = 1; c < starts_.size(); ++c) {
-      starts_[c] += starts_[c - 1];
-    }
-    members_.resize(starts_.back());
-    points_.resize(starts_.back());
-    std::vector<std::uint32_t> next(starts_.begin(), starts_.end() - 1);
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      if (points[i].allFinite()) {
-        const std::uint32_t place = next[cell_of(points[i])]++;
-        members_[place] = static_cast<std::uint32_t>(i);
-        points_[place] = points[i];
-      }
-    }
-  }
-
-  int along_ = 0;
-  double strip_begin_px_ = 0.0;
-  double cell_begin_px_ = 0.0;
-  double strip_px_ = kStripPx;
-  double cell_px_ = kCellPx;
-  int strips_ = 0;
-  int cells_ = 0;
-  std::vector<std::uint32_t> starts_;
-  std::vector<std::uint32_t> members_;
-  std::vector<Eigen::Vector2d> points_;
+/// Smallest box around the finite points; low above high when there are none.
+struct Box {
+  Eigen::Array2d low = Eigen::Array2d::Constant(std::numeric_limits<double>::max());
+  Eigen::Array2d high = Eigen::Array2d::Constant(std::numeric_limits<double>::lowest());
 };
+
+Box bounding_box(std::span<const Eigen::Vector2d> points) {
+  Box box;
+  for (const Eigen::Vector2d& point : points) {
+    if (point.allFinite()) {
+      box.low = box.low.min(point.array());
+      box.high = box.high.max(point.array());
+    }
+  }
+  return box;
+}
+
+/// Counting sort of the finite points into strips along one axis.
+PointStrips make_strips(std::span<const Eigen::Vector2d> points, const Box& box, int along) {
+  PointStrips out;
+  out.along = along;
+  if (box.low[0] > box.high[0]) {
+    return out;
+  }
+  const int across = 1 - along;
+  const Eigen::Array2d size = box.high - box.low;
+  const double strip_px = std::max(kStripPx, size[along] / kMostCells);
+  const double cell_px = std::max(kCellPx, size[across] / kMostCells);
+  out.strips = static_cast<int>(size[along] / strip_px) + 1;
+  out.cells = static_cast<int>(size[across] / cell_px) + 1;
+  out.strip_begin_px = static_cast<float>(box.low[along]);
+  out.cell_begin_px = static_cast<float>(box.low[across]);
+  out.strip_px = static_cast<float>(strip_px);
+  out.cell_px = static_cast<float>(cell_px);
+  const auto cell_of = [&](const Eigen::Vector2d& point) {
+    const auto strip = static_cast<std::size_t>((point[along] - box.low[along]) / strip_px);
+    const auto cell = static_cast<std::size_t>((point[across] - box.low[across]) / cell_px);
+    return strip * static_cast<std::size_t>(out.cells) + cell;
+  };
+  out.starts.assign(static_cast<std::size_t>(out.strips) * static_cast<std::size_t>(out.cells) + 1,
+                    0);
+  for (const Eigen::Vector2d& point : points) {
+    if (point.allFinite()) {
+      ++out.starts[cell_of(point) + 1];
+    }
+  }
+  std::partial_sum(out.starts.begin(), out.starts.end(), out.starts.begin());
+  const std::size_t padded = out.starts.back() + internal::kStripPadding;
+  out.x_px.resize(padded);
+  out.y_px.resize(padded);
+  out.members.resize(padded);
+  std::vector<std::uint32_t> next(out.starts.begin(), out.starts.end() - 1);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (points[i].allFinite()) {
+      const std::uint32_t place = next[cell_of(points[i])]++;
+      out.x_px[place] = static_cast<float>(points[i].x());
+      out.y_px[place] = static_cast<float>(points[i].y());
+      out.members[place] = static_cast<std::uint32_t>(i);
+    }
+  }
+  return out;
+}
+
+/// Gate for the points of the second image that belong to `point` of the first: within the error of
+/// its line, and it of theirs.
+LineGate make_gate(const Eigen::Matrix3d& fundamental,
+                   const Eigen::Vector2d& point,
+                   double max_error_px) {
+  const Eigen::Vector3d line = fundamental * point.homogeneous();
+  const double scale = 1.0 / line.head<2>().norm();
+  LineGate gate;
+  for (int i = 0; i < 3; ++i) {
+    const auto place = static_cast<std::size_t>(i);
+    gate.line[place] = static_cast<float>(scale * line[i]);
+    gate.back_x[place] = static_cast<float>(scale * fundamental(i, 0));
+    gate.back_y[place] = static_cast<float>(scale * fundamental(i, 1));
+  }
+  gate.limit = static_cast<float>(max_error_px * max_error_px);
+  return gate;
+}
 
 /// Among equals the lowest position stays, in whatever order they come.
 void take_in(std::int32_t score, std::size_t position, NearestTwo& nearest) {
@@ -145,40 +125,20 @@ GuidedScan scan_near_lines(const GuidedImage& first,
                            const GuidedImage& second,
                            const Eigen::Matrix3d& fundamental,
                            double max_error_px) {
-  const PointStrips strips[2] = {PointStrips(second.points_px, 0),
-                                 PointStrips(second.points_px, 1)};
-  const double limit = max_error_px * max_error_px;
+  const Box box = bounding_box(second.points_px);
+  const PointStrips strips[2] = {make_strips(second.points_px, box, 0),
+                                 make_strips(second.points_px, box, 1)};
   GuidedScan scan{.rows = std::vector<NearestTwo>(first.index.size()),
                   .columns = std::vector<NearestTwo>(second.index.size())};
-  // One place more than points: the place after the last is written too.
-  std::vector<std::uint32_t> candidates(second.index.size() + 1);
-  std::vector<double> squared_errors(second.index.size() + 1);
+  std::vector<std::uint32_t> candidates(second.index.size() + internal::kStripPadding);
   std::vector<std::int32_t> scores(second.index.size());
   for (std::size_t i = 0; i < first.index.size(); ++i) {
-    const Eigen::Vector2d& point = first.points_px[i];
-    if (!point.allFinite()) {
+    if (!first.points_px[i].allFinite()) {
       continue;
     }
-    const Eigen::Vector3d line = fundamental * point.homogeneous();
-    const double line_limit = limit * line.head<2>().squaredNorm();
-    const Eigen::Matrix2d back = fundamental.topLeftCorner<2, 2>().transpose();
-    const Eigen::Vector2d back_offset = fundamental.row(2).head<2>().transpose();
-    // Both tests write first and count after, without a branch that could not be predicted.
-    std::size_t near_line = 0;
-    const int along = std::abs(line.y()) >= std::abs(line.x()) ? 0 : 1;
-    strips[along].visit_line(
-        line, max_error_px, [&](const Eigen::Vector2d& other, std::uint32_t j) {
-          const double error = line.x() * other.x() + line.y() * other.y() + line.z();
-          candidates[near_line] = j;
-          squared_errors[near_line] = error * error;
-          near_line += static_cast<std::size_t>(error * error <= line_limit);
-        });
-    std::size_t count = 0;
-    for (std::size_t c = 0; c < near_line; ++c) {
-      const Eigen::Vector2d gradient = back * second.points_px[candidates[c]] + back_offset;
-      candidates[count] = candidates[c];
-      count += static_cast<std::size_t>(squared_errors[c] <= limit * gradient.squaredNorm());
-    }
+    const LineGate gate = make_gate(fundamental, first.points_px[i], max_error_px);
+    const int along = std::abs(gate.line[1]) >= std::abs(gate.line[0]) ? 0 : 1;
+    const std::size_t count = internal::find_near_line(strips[along], gate, candidates.data());
     internal::similarities(first.index.rows(),
                            i,
                            second.index.rows(),

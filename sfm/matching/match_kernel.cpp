@@ -26,7 +26,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "sfm/matching/match_scorers_inl.hpp"
+#include "sfm/matching/match_scorers.inl"
 
 HWY_BEFORE_NAMESPACE();
 

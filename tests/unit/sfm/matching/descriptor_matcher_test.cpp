@@ -9,10 +9,13 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
+
+#include "tests/unit/sfm/matching/instruction_sets.hpp"
 
 namespace trigmesh {
 namespace {
+
+using test_support::for_each_instruction_set;
 
 FeatureSet empty_set(FeatureKind kind, std::size_t bytes) {
   FeatureSet set;
@@ -153,22 +156,6 @@ std::vector<FeatureMatch> fast_match(const FeatureSet& a,
   EXPECT_TRUE(index_a.has_value());
   EXPECT_TRUE(index_b.has_value());
   return match_descriptors(*index_a, *index_b, options);
-}
-
-/// Runs `check` once for every instruction set of this machine.
-template <typename Check>
-void for_each_instruction_set(const Check& check) {
-  hwy::SetSupportedTargetsForTest(0);
-  const std::int64_t all = hwy::SupportedTargets();
-  for (std::int64_t rest = all; rest != 0; rest &= rest - 1) {
-    const std::int64_t target = rest & -rest;
-    SCOPED_TRACE(hwy::TargetName(target));
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(target);
-    check();
-  }
-  hwy::SetSupportedTargetsForTest(0);
-  hwy::GetChosenTarget().Update(all);
 }
 
 struct Kind {

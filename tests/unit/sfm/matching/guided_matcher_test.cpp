@@ -9,6 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/unit/sfm/matching/instruction_sets.hpp"
 #include "tests/unit/sfm/matching/synthetic_pair.hpp"
 
 namespace trigmesh {
@@ -106,7 +107,7 @@ std::vector<FeatureMatch> slow_guided(const GuidedImage& a,
   return out;
 }
 
-TEST(MatchGuided, AgreesWithBruteForceForManyMotions) {
+TEST(MatchGuided, AgreesWithBruteForceForManyMotionsAndInstructionSets) {
   const std::vector<Rigid3> motions = {
       {Eigen::Quaterniond::Identity(), {-1.0, 0.0, 0.0}},
       {Eigen::Quaterniond::Identity(), {0.0, -1.0, 0.0}},
@@ -122,9 +123,10 @@ TEST(MatchGuided, AgreesWithBruteForceForManyMotions) {
       const auto second = DescriptorIndex::build(described.second);
       const GuidedImage a{*first, pair.first};
       const GuidedImage b{*second, pair.second};
-      const auto matches = match_guided(a, b, pair.fundamental, {});
-      EXPECT_EQ(matches, slow_guided(a, b, pair.fundamental, {}));
-      EXPECT_GT(matches.size(), 200U);
+      const auto expected = slow_guided(a, b, pair.fundamental, {});
+      EXPECT_GT(expected.size(), 200U);
+      test_support::for_each_instruction_set(
+          [&] { EXPECT_EQ(match_guided(a, b, pair.fundamental, {}), expected); });
     }
   }
 }

@@ -2,11 +2,11 @@
 // match_kernel.cpp, compiled once for each instruction set, therefore without an ordinary include
 // guard.
 
-#if defined(TRIGMESH_SFM_MATCHING_MATCH_SCORERS_INL_HPP_) == defined(HWY_TARGET_TOGGLE)
-#ifdef TRIGMESH_SFM_MATCHING_MATCH_SCORERS_INL_HPP_
-#undef TRIGMESH_SFM_MATCHING_MATCH_SCORERS_INL_HPP_
+#if defined(TRIGMESH_SFM_MATCHING_MATCH_SCORERS_INL_) == defined(HWY_TARGET_TOGGLE)
+#ifdef TRIGMESH_SFM_MATCHING_MATCH_SCORERS_INL_
+#undef TRIGMESH_SFM_MATCHING_MATCH_SCORERS_INL_
 #else
-#define TRIGMESH_SFM_MATCHING_MATCH_SCORERS_INL_HPP_
+#define TRIGMESH_SFM_MATCHING_MATCH_SCORERS_INL_
 #endif
 
 #include <cstddef>
