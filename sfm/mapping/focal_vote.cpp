@@ -39,6 +39,12 @@ double singular_value_gap(const Eigen::Matrix3d& essential) {
   return large > 0.0 ? (large - middle) / (large + middle) : 1.0;
 }
 
+/// Which pairs vote for a group.
+enum class Voters {
+  kOwnPairs,  ///< both images of the group: the other groups do not matter
+  kAllPairs,
+};
+
 class Election {
  public:
   Election(std::span<const Camera> cameras,
@@ -46,19 +52,20 @@ class Election {
            std::vector<double> focal_px)
       : cameras_(cameras), evidence_(evidence), focal_px_(std::move(focal_px)) {}
 
-  [[nodiscard]] bool has_evidence(CameraId camera) const {
+  [[nodiscard]] bool has_evidence(CameraId camera, Voters voters) const {
     return std::any_of(evidence_.begin(), evidence_.end(), [&](const FocalEvidence& e) {
-      return e.first == camera || e.second == camera;
+      return votes(e, camera, voters);
     });
   }
 
   /// Best focal length of one group with the others as they are.
-  [[nodiscard]] double best(CameraId camera) const {
+  [[nodiscard]] double best(CameraId camera, Voters voters) const {
     const double side = longer_side(cameras_[index(camera)]);
     const double step = std::log(kLargestRatio / kSmallestRatio) / (kGridSteps - 1);
     std::vector<double> costs(kGridSteps);
     for (int i = 0; i < kGridSteps; ++i) {
-      costs[static_cast<std::size_t>(i)] = cost(camera, side * kSmallestRatio * std::exp(step * i));
+      costs[static_cast<std::size_t>(i)] =
+          cost(camera, voters, side * kSmallestRatio * std::exp(step * i));
     }
     const auto lowest =
         static_cast<int>(std::min_element(costs.begin(), costs.end()) - costs.begin());
@@ -72,10 +79,15 @@ class Election {
   [[nodiscard]] std::vector<double> result() const { return focal_px_; }
 
  private:
-  [[nodiscard]] double cost(CameraId camera, double focal_px) const {
+  static bool votes(const FocalEvidence& e, CameraId camera, Voters voters) {
+    return voters == Voters::kOwnPairs ? e.first == camera && e.second == camera
+                                       : e.first == camera || e.second == camera;
+  }
+
+  [[nodiscard]] double cost(CameraId camera, Voters voters, double focal_px) const {
     double sum = 0.0;
     for (const FocalEvidence& e : evidence_) {
-      if (e.first != camera && e.second != camera) {
+      if (!votes(e, camera, voters)) {
         continue;
       }
       const double first = e.first == camera ? focal_px : focal_px_[index(e.first)];
@@ -114,14 +126,22 @@ std::vector<double> vote_focal_lengths(std::span<const Camera> cameras,
     start[i] = unknown[i] ? kRatioWithoutEvidence * longer_side(cameras[i]) : cameras[i].fx_px;
   }
   Election election(cameras, evidence, start);
+  // One group after the other ends in a kink of the cost when all begin far off: pairs between two
+  // groups fix their product, so neither can leave alone. Pairs within a group have no such kink.
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    const auto camera = id_of<CameraId>(i);
+    if (unknown[i] && election.has_evidence(camera, Voters::kOwnPairs)) {
+      election.elect(camera, election.best(camera, Voters::kOwnPairs));
+    }
+  }
   for (int sweep = 0; sweep < kMaxSweeps; ++sweep) {
     bool changed = false;
     for (std::size_t i = 0; i < cameras.size(); ++i) {
       const auto camera = id_of<CameraId>(i);
-      if (!unknown[i] || !election.has_evidence(camera)) {
+      if (!unknown[i] || !election.has_evidence(camera, Voters::kAllPairs)) {
         continue;
       }
-      const double better = election.best(camera);
+      const double better = election.best(camera, Voters::kAllPairs);
       changed = changed || std::abs(better / election.focal_px(camera) - 1.0) > 1e-6;
       election.elect(camera, better);
     }
