@@ -197,6 +197,11 @@ bool MapBuilder::refine() {
   return true;
 }
 
+void MapBuilder::extend() {
+  (void)structure_.complete(map_);
+  (void)structure_.triangulate_all(map_);  // how many does not matter here
+}
+
 void MapBuilder::finish() {
   MapperOptions strict_options = *options_;
   strict_options.max_reprojection_px = options_->final_reprojection_px;

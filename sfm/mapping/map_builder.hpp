@@ -32,6 +32,9 @@ class MapBuilder {
   /// nothing has changed since the last time.
   [[nodiscard]] bool refine();
 
+  /// Landmarks and observations that tracks allow now but did not when their views were registered.
+  void extend();
+
   /// Last adjustments with all landmarks; drops views that parallax does not support (noted in the
   /// store).
   void finish();

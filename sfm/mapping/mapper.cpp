@@ -235,6 +235,10 @@ void Mapper::State::join_maps() {
 
 void Mapper::finish() {
   state_->follow_additions();
+  // Pairs that came after the maps had grown may have made one track of what both maps see.
+  for (const auto& map : state_->maps) {
+    map->extend();
+  }
   state_->join_maps();
   for (const auto& map : state_->maps) {
     map->finish();
