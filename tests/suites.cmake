@@ -2,11 +2,11 @@
 #   cmake -DROOT=. -P tests/suites.cmake && cd build/tests && ctest
 # A suite is the test folder of one build; names of tests carry the sanitizer, so that they stay apart.
 set(suites
-  release/tests            # all
-  fuzz/tests/unit          # unit tests, address and undefined sanitizers, clang
-  fuzz/tests/fuzz          # every fuzz target for TRIGMESH_FUZZ_SECONDS
-  tsan/tests/unit/firmware # threads
-)
+  release/tests                       # all
+  fuzz/tests/unit                     # unit tests, address and undefined sanitizers, clang
+  fuzz/tests/fuzz                     # every fuzz target for TRIGMESH_FUZZ_SECONDS
+  tsan/tests/unit/firmware/base       # threads
+  tsan/tests/unit/firmware/pipeline)
 set(content "# Written by tests/suites.cmake.\n")
 foreach(suite IN LISTS suites)
   if(NOT EXISTS "${ROOT}/build/${suite}/CTestTestfile.cmake")
