@@ -4,8 +4,6 @@
 #include <cmath>
 #include <cstring>
 #include <numbers>
-#include <numeric>
-#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -13,6 +11,7 @@
 
 #include "firmware/base/check.hpp"
 #include "sfm/features/extractors.hpp"
+#include "sfm/features/keypoint_spread.hpp"
 
 namespace trigmesh {
 namespace {
@@ -70,17 +69,16 @@ FeatureSet to_feature_set(const std::vector<cv::KeyPoint>& points,
   return set;
 }
 
-/// Keeps the strongest `count` features; ties by place, so that the choice does not depend on their
-/// order.
-void keep_best(FeatureSet& set, int count) {
-  std::vector<std::size_t> order(set.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    const Keypoint& p = set.keypoints[a];
-    const Keypoint& q = set.keypoints[b];
-    return std::tuple(-p.response, p.y_px, p.x_px) < std::tuple(-q.response, q.y_px, q.x_px);
-  });
-  order.resize(std::min(order.size(), static_cast<std::size_t>(count)));
+/// Keeps the strongest `count` features, spread over the image.
+void keep_spread(FeatureSet& set, const cv::Size& size, int count) {
+  std::vector<SpreadCandidate> candidates;
+  candidates.reserve(set.size());
+  for (const Keypoint& keypoint : set.keypoints) {
+    candidates.push_back(
+        {.x_px = keypoint.x_px, .y_px = keypoint.y_px, .strength = keypoint.response});
+  }
+  const auto order =
+      spread_keypoints(candidates, size.width, size.height, static_cast<std::size_t>(count));
   FeatureSet kept{.kind = set.kind,
                   .keypoints = {},
                   .descriptor_bytes = set.descriptor_bytes,
@@ -106,7 +104,7 @@ class OpenCvExtractor : public FeatureExtractor {
       cv::Mat rows;
       run(grey, points, rows);
       FeatureSet set = to_feature_set(points, rows, conversion_);
-      keep_best(set, options_.max_keypoints);
+      keep_spread(set, grey.size(), options_.max_keypoints);
       sort_features(set);
       return set;
     } catch (const cv::Exception& error) {

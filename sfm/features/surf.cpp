@@ -1,10 +1,9 @@
 #include <algorithm>
-#include <tuple>
-#include <utility>
 
 #include "firmware/base/check.hpp"
 #include "sfm/features/extractors.hpp"
 #include "sfm/features/integral_image.hpp"
+#include "sfm/features/keypoint_spread.hpp"
 #include "sfm/features/surf_descriptor.hpp"
 #include "sfm/features/surf_detector.hpp"
 
@@ -33,14 +32,24 @@ cv::Mat doubled(const cv::Mat& grey) {
   return result;
 }
 
-/// The strongest points; ties by place, so that the choice does not depend on the sort.
-std::vector<Keypoint> strongest(std::vector<Keypoint> keypoints, int count) {
-  std::sort(keypoints.begin(), keypoints.end(), [](const Keypoint& a, const Keypoint& b) {
-    return std::tuple(-a.response, a.y_px, a.x_px, a.scale_px) <
-           std::tuple(-b.response, b.y_px, b.x_px, b.scale_px);
-  });
-  keypoints.resize(std::min(keypoints.size(), static_cast<std::size_t>(count)));
-  return keypoints;
+/// The strongest points, spread over the image.
+std::vector<Keypoint> select(const std::vector<Keypoint>& keypoints,
+                             const IntegralImage& integral,
+                             int count) {
+  std::vector<SpreadCandidate> candidates;
+  candidates.reserve(keypoints.size());
+  for (const Keypoint& keypoint : keypoints) {
+    candidates.push_back(
+        {.x_px = keypoint.x_px, .y_px = keypoint.y_px, .strength = keypoint.response});
+  }
+  std::vector<Keypoint> selected;
+  for (const std::size_t index : spread_keypoints(candidates,
+                                                  integral.width_px(),
+                                                  integral.height_px(),
+                                                  static_cast<std::size_t>(count))) {
+    selected.push_back(keypoints[index]);
+  }
+  return selected;
 }
 
 class SurfExtractor final : public FeatureExtractor {
@@ -53,7 +62,7 @@ class SurfExtractor final : public FeatureExtractor {
     std::vector<Keypoint> keypoints = detect_surf_keypoints(
         integral,
         {.threshold = kThreshold, .octaves = options_.upsample ? kOctaves + 1 : kOctaves});
-    keypoints = strongest(std::move(keypoints), options_.max_keypoints);
+    keypoints = select(keypoints, integral, options_.max_keypoints);
 
     FeatureSet set{.kind = FeatureKind::kSurf,
                    .keypoints = {},

@@ -280,7 +280,7 @@ void quantize_surf(const SurfVector& descriptor,
     scale = std::max(scale, std::sqrt(length_squared_left / free_squared));
   }
   std::transform(descriptor.begin(), descriptor.end(), bytes.begin(), [&](float v) {
-    return static_cast<std::uint8_t>(std::min(kLargestByte, v * scale + 0.5F));
+    return static_cast<std::uint8_t>(std::lround(std::min(kLargestByte, v * scale)));
   });
 }
 

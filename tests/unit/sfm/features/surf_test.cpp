@@ -75,14 +75,14 @@ double matching_rate(const Similarity& first, const Similarity& second, bool ori
 constexpr Similarity kReference{.shift_x = 160.0, .shift_y = 150.0};
 
 TEST(Surf, UprightPointsAreFoundAgainAfterAShiftOfFractionsOfAPixel) {
-  EXPECT_GT(matching_rate(kReference, {.shift_x = 167.4, .shift_y = 146.7}, false), 0.9);
+  EXPECT_GT(matching_rate(kReference, {.shift_x = 167.4, .shift_y = 146.7}, false), 0.8);
 }
 
 TEST(Surf, OrientedPointsAreFoundAgainAfterRotation) {
   for (const double degrees : {17.0, 45.0, 90.0, 161.0}) {
     const Similarity turned{
         .angle_rad = degrees * std::numbers::pi / 180.0, .shift_x = 160.0, .shift_y = 150.0};
-    EXPECT_GT(matching_rate(kReference, turned, true), 0.65) << degrees;
+    EXPECT_GT(matching_rate(kReference, turned, true), 0.6) << degrees;
   }
 }
 
@@ -94,7 +94,7 @@ TEST(Surf, UprightPointsAreLostAfterALargeRotation) {
 TEST(Surf, PointsAreFoundAgainAfterAChangeOfScale) {
   for (const double scale : {0.7, 1.5}) {
     EXPECT_GT(matching_rate(kReference, {.scale = scale, .shift_x = 160.0, .shift_y = 150.0}, true),
-              0.4)
+              0.35)
         << scale;
   }
 }
