@@ -11,6 +11,7 @@
 namespace {
 
 constexpr const char* kFooter = R"(Examples:
+  trigmesh calibrate photos --board 9x6 --square 25mm --output camera.toml
   trigmesh evaluate out --truth truth/images.txt
   trigmesh export out --format colmap-binary --output out/colmap
 `trigmesh SUBCOMMAND --help` has more.
@@ -29,6 +30,7 @@ Exit codes:
 
 void add_all_commands(CLI::App& app, trigmesh::CommandContext& context) {
   trigmesh::add_reconstruct_command(app, context);
+  trigmesh::add_calibrate_command(app, context);
   trigmesh::add_evaluate_command(app, context);
   trigmesh::add_export_command(app, context);
 }
