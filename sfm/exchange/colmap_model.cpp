@@ -76,14 +76,15 @@ Result<std::vector<Observation>> checked_track(const ColmapTables& tables,
     track.push_back({id_of<ViewId>(*position), FeatureIndex{keypoint}});
   }
   std::ranges::sort(track);
-  const auto repeated = std::ranges::unique(track);
-  track.erase(repeated.begin(), repeated.end());
+  track.erase(std::unique(track.begin(), track.end()), track.end());
   return track;
 }
 
 void keep_first_of_each_view(std::vector<Observation>& track) {
-  const auto repeated = std::ranges::unique(track, {}, &Observation::view);
-  track.erase(repeated.begin(), repeated.end());
+  const auto same_view = [](const Observation& a, const Observation& b) {
+    return a.view == b.view;
+  };
+  track.erase(std::unique(track.begin(), track.end(), same_view), track.end());
 }
 
 /// Every keypoint that names a point must name one that exists; returns how many do.
