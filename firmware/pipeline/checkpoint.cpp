@@ -55,7 +55,7 @@ Result<> CheckpointFolder::save(const std::string& name,
   if (!payload.empty()) {
     std::memcpy(bytes.data() + sizeof(header), payload.data(), payload.size());
   }
-  return write_file_atomically(folder_ / name, bytes);
+  return write_file_atomically(folder_ / name, bytes, Durability::kCache);
 }
 
 std::optional<std::vector<std::uint8_t>> CheckpointFolder::load(const std::string& name,

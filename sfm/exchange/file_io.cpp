@@ -41,7 +41,7 @@ int write_all(int fd, std::string_view bytes) {
 }
 
 /// 0 or errno; the bytes are on the disk when it returns 0.
-int write_new_file(const fs::path& path, std::string_view bytes) {
+int write_new_file(const fs::path& path, std::string_view bytes, Durability durability) {
   constexpr mode_t kMode = 0666;  // the umask takes its part away
   UniqueFd fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, kMode));
   if (!fd.valid()) {
@@ -50,7 +50,7 @@ int write_new_file(const fs::path& path, std::string_view bytes) {
   if (const int failed = write_all(fd.get(), bytes); failed != 0) {
     return failed;
   }
-  if (::fsync(fd.get()) != 0) {
+  if (durability == Durability::kSynced && ::fsync(fd.get()) != 0) {
     return errno;
   }
   return fd.close();
@@ -95,9 +95,11 @@ Result<> replace_in_two_steps(const fs::path& staged, const fs::path& target) {
 
 }  // namespace
 
-Result<> write_file_atomically(const fs::path& path, std::string_view bytes) {
+Result<> write_file_atomically(const fs::path& path,
+                               std::string_view bytes,
+                               Durability durability) {
   const fs::path part = path.parent_path() / fmt::format(".{}.part", path.filename().string());
-  int failed = write_new_file(part, bytes);
+  int failed = write_new_file(part, bytes, durability);
   if (failed == 0 && ::rename(part.c_str(), path.c_str()) != 0) {
     failed = errno;
   }
@@ -109,7 +111,9 @@ Result<> write_file_atomically(const fs::path& path, std::string_view bytes) {
     }
     return tl::unexpected<Error>(std::move(error));
   }
-  sync_directory(path.parent_path());
+  if (durability == Durability::kSynced) {
+    sync_directory(path.parent_path());
+  }
   return {};
 }
 

@@ -14,11 +14,15 @@ namespace trigmesh {
 /// The largest model file that is read into memory unless the caller says otherwise.
 inline constexpr std::size_t kMaxModelFileBytes = std::size_t{1} << 30;
 
-/// Replaces the file or leaves it as it was: writes `.NAME.part` beside it, fsyncs, renames. After
-/// a failure the part file is gone. kNoSpace for a full disk or quota, kIo otherwise (missing
-/// folder, permission, device).
+/// Whether a file must survive a power cut, or can be made again and should not wait for the disk.
+enum class Durability { kSynced, kCache };
+
+/// Replaces the file or leaves it as it was: writes `.NAME.part` beside it, fsyncs (kSynced),
+/// renames. After a failure the part file is gone. kNoSpace for a full disk or quota, kIo otherwise
+/// (missing folder, permission, device).
 [[nodiscard]] Result<> write_file_atomically(const std::filesystem::path& path,
-                                             std::string_view bytes);
+                                             std::string_view bytes,
+                                             Durability durability = Durability::kSynced);
 
 /// Makes the folder and its parents; no failure when it is there.
 [[nodiscard]] Result<> make_directory(const std::filesystem::path& path);

@@ -57,8 +57,11 @@ Result<PhotoSet> open_photos(const std::string& input) {
   }
   photos.ordered = recording.kind() == RecordingKind::kRecording &&
                    recording.frames().front().timestamp.has_value();
-  photos.description =
-      fmt::format("{}, {} photographs", to_string(recording.kind()), recording.size());
+  const std::filesystem::path path = std::filesystem::path(input).lexically_normal();
+  const std::filesystem::path name =
+      path.has_filename() ? path.filename() : path.parent_path().filename();
+  photos.description = fmt::format(
+      "{}: {}, {} photographs", name.string(), to_string(recording.kind()), recording.size());
   photos.read = [recording](std::size_t i) -> Result<std::vector<std::uint8_t>> {
     TM_ASSIGN_OR_RETURN(Frame frame, recording.frame(i));
     return std::move(frame.bytes);
