@@ -15,15 +15,14 @@ namespace {
 
 // A keypoint sits on the darkest or brightest spot of a blob; its surroundings tell the colour of
 // the surface.
-constexpr double kColorRadiusInScales = 2.0;
+constexpr float kColorRadiusInScales = 2.0F;
 constexpr int kMaxColorRadiusPx = 6;
 
 Rgb mean_color(const cv::Mat& rgb, const Keypoint& keypoint) {
   const int x = static_cast<int>(std::lround(keypoint.x_px));
   const int y = static_cast<int>(std::lround(keypoint.y_px));
-  const int radius =
-      std::min(kMaxColorRadiusPx,
-               static_cast<int>(std::lround(kColorRadiusInScales * double{keypoint.scale_px})));
+  const int radius = std::min(
+      kMaxColorRadiusPx, static_cast<int>(std::lround(kColorRadiusInScales * keypoint.scale_px)));
   std::array<int, 3> sum{};
   int count = 0;
   for (int row = std::max(0, y - radius); row <= std::min(rgb.rows - 1, y + radius); ++row) {
