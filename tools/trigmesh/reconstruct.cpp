@@ -49,15 +49,17 @@ struct ReconstructArguments {
   std::uint64_t seed = 0;
 };
 
-Result<PhotoSet> open_photos(const std::string& input) {
-  TM_ASSIGN_OR_RETURN(const Recording recording, Recording::open(input));
+Result<PhotoSet> open_photos(const ReconstructArguments& arguments) {
+  RecordingOptions options;
+  options.subfolders = arguments.grouping == "folder" ? Subfolders::kInclude : Subfolders::kIgnore;
+  TM_ASSIGN_OR_RETURN(const Recording recording, Recording::open(arguments.input, options));
   PhotoSet photos;
   for (const RecordedFrame& frame : recording.frames()) {
     photos.names.push_back(frame.name);
   }
   photos.ordered = recording.kind() == RecordingKind::kRecording &&
                    recording.frames().front().timestamp.has_value();
-  const std::filesystem::path path = std::filesystem::path(input).lexically_normal();
+  const std::filesystem::path path = std::filesystem::path(arguments.input).lexically_normal();
   const std::filesystem::path name =
       path.has_filename() ? path.filename() : path.parent_path().filename();
   photos.description = fmt::format(
@@ -115,7 +117,7 @@ void print_summary(const ReconstructionReport& report, const std::string& output
 
 Result<> run(const ReconstructArguments& arguments) {
   TM_ASSIGN_OR_RETURN(const ReconstructionOptions options, options_from(arguments));
-  TM_ASSIGN_OR_RETURN(const PhotoSet photos, open_photos(arguments.input));
+  TM_ASSIGN_OR_RETURN(const PhotoSet photos, open_photos(arguments));
   const SteadyClock clock;
   const InterruptWatch interrupt;
   std::optional<ReconstructionSummary> summary;

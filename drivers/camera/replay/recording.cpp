@@ -45,27 +45,33 @@ struct FolderContents {
   std::vector<std::string> ignored;
 };
 
-Result<FolderContents> list_folder(const fs::path& folder, std::size_t max_frames) {
+Result<FolderContents> list_folder(const fs::path& folder, const RecordingOptions& options) {
   FolderContents contents;
   std::error_code error;
-  fs::directory_iterator entry(folder, error);
-  for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
-    const std::string name = entry->path().filename().string();
-    const std::optional<FrameFormat> format = format_of(entry->path());
+  fs::recursive_directory_iterator entry(folder, error);  // does not follow links to folders
+  for (; !error && entry != fs::recursive_directory_iterator(); entry.increment(error)) {
+    const std::string name = entry->path().lexically_relative(folder).generic_string();
     std::error_code type_error;
-    if (is_hidden(name)) {
+    const bool is_folder = entry->is_directory(type_error);
+    if (is_hidden(entry->path().filename().string())) {
+      entry.disable_recursion_pending();
       continue;
     }
+    if (is_folder && options.subfolders == Subfolders::kInclude) {
+      continue;  // its files follow
+    }
+    entry.disable_recursion_pending();
+    const std::optional<FrameFormat> format = format_of(entry->path());
     if (!format || !entry->is_regular_file(type_error) || !is_safe_frame_name(name)) {
       contents.ignored.push_back(name);
     } else {
       contents.frames.push_back({name, entry->path(), std::nullopt, *format});
     }
-    if (contents.frames.size() + contents.ignored.size() > max_frames) {
+    if (contents.frames.size() + contents.ignored.size() > options.max_frames) {
       return fail(ErrorCode::kLimitExceeded,
                   "{} holds more than {} files, the declared limit",
                   folder.string(),
-                  max_frames);
+                  options.max_frames);
     }
   }
   if (error) {
@@ -118,7 +124,7 @@ Result<FolderContents> order_by_time(FolderContents contents,
 
 Result<FolderContents> list_recording(const fs::path& folder, const RecordingOptions& options) {
   const fs::path images = folder / "images";
-  TM_ASSIGN_OR_RETURN(FolderContents contents, list_folder(images, options.max_frames));
+  TM_ASSIGN_OR_RETURN(FolderContents contents, list_folder(images, options));
   const fs::path table = folder / "timestamps.csv";
   std::error_code error;
   if (!fs::exists(table, error)) {
@@ -206,7 +212,7 @@ Result<Recording> Recording::open(const fs::path& input, const RecordingOptions&
       case RecordingKind::kPhotoFolder:
         break;
     }
-    return list_folder(input, options.max_frames);
+    return list_folder(input, options);
   }();
   if (!contents) {
     return tl::unexpected<Error>(std::move(contents).error());

@@ -13,6 +13,9 @@
 
 namespace trigmesh {
 
+/// Whether pictures in folders inside the image folder belong to the recording.
+enum class Subfolders { kIgnore, kInclude };
+
 /// Bounds on what a folder from outside may make us do.
 struct RecordingOptions {
   /// Largest number of frames; more is kLimitExceeded. > 0.
@@ -21,6 +24,10 @@ struct RecordingOptions {
   std::size_t max_frame_bytes = std::size_t{256} << 20U;
   /// Largest size of a list file or timestamps.csv, bytes. > 0.
   std::size_t max_table_bytes = std::size_t{16} << 20U;
+
+  /// kInclude: sets of several cameras, a folder each; names are then "left/001.jpg". Links to
+  /// folders are never followed.
+  Subfolders subfolders = Subfolders::kIgnore;
 
   [[nodiscard]] Result<> validate() const;
 };

@@ -72,6 +72,26 @@ TEST_F(RecordingTest, DoesNotWaitForAPipeNamedLikeAPicture) {
   EXPECT_THAT(recording->ignored(), ElementsAre("folder.jpg", "pipe.jpg"));
 }
 
+TEST_F(RecordingTest, TakesSubfoldersOnlyWhenAsked) {
+  write("b.jpg");
+  write("right/2.jpg");
+  write("left/10.jpg");
+  write("left/9.jpg");
+  write(".cache/3.jpg");
+  fs::create_directory_symlink(root_ / "left", root_ / "link");
+  const auto flat = Recording::open(root_);
+  ASSERT_TRUE(flat) << flat.error().message;
+  EXPECT_THAT(names(*flat), ElementsAre("b.jpg"));
+  EXPECT_THAT(flat->ignored(), ElementsAre("left", "link", "right"));
+
+  RecordingOptions options;
+  options.subfolders = Subfolders::kInclude;
+  const auto deep = Recording::open(root_, options);
+  ASSERT_TRUE(deep) << deep.error().message;
+  EXPECT_THAT(names(*deep), ElementsAre("b.jpg", "left/9.jpg", "left/10.jpg", "right/2.jpg"));
+  EXPECT_EQ(deep->frame(1)->name, "left/9.jpg");
+}
+
 TEST_F(RecordingTest, OrdersRecordingByTimestamp) {
   write("images/a.jpg", "first name");
   write("images/b.jpg", "second name");
