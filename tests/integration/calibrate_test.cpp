@@ -1,19 +1,19 @@
 // Runs the program on photographs of boards: rendered ones with a known camera, and real ones when
 // they are there.
-#include <array>
-#include <cstdio>
+#include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <string>
-
-#include <sys/wait.h>
+#include <utility>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "sfm/exchange/camera_profile.hpp"
 #include "sfm/exchange/image_codec.hpp"
+#include "tests/integration/run_program.hpp"
 #include "tests/support/board_renderer.hpp"
 
 namespace trigmesh {
@@ -24,36 +24,25 @@ using test_support::PlaneRenderer;
 using test_support::varied_board_poses;
 using ::testing::HasSubstr;
 
+constexpr std::chrono::seconds kTimeLimit(240);
+
 struct Outcome {
   int exit_code = -1;
-  std::string output;
+  std::string output;  ///< stdout, then stderr
 };
 
-/// stdout and stderr together.
-Outcome run_trigmesh(const std::string& arguments) {
-  const std::string command = std::string(TRIGMESH_BINARY) + " " + arguments + " 2>&1";
-  Outcome outcome;
-  FILE* pipe = popen(command.c_str(), "r");
-  std::array<char, 4096> buffer{};
-  for (std::size_t count = 0; (count = std::fread(buffer.data(), 1, buffer.size(), pipe)) > 0;) {
-    outcome.output.append(buffer.data(), count);
-  }
-  const int status = pclose(pipe);
-  outcome.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-  return outcome;
+Outcome calibrate(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), "calibrate");
+  const auto result = test_support::run_trigmesh(std::move(arguments), kTimeLimit);
+  return {.exit_code = result.exit_code, .output = result.out + result.err};
 }
 
-class Calibrate : public ::testing::Test {
+class Calibrate : public test_support::ScratchTest {
  protected:
   void SetUp() override {
-    folder_ = std::filesystem::path(::testing::TempDir()) /
-              ("calibrate_" +
-               std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_ / "photos");
+    ScratchTest::SetUp();
+    std::filesystem::create_directories(photos());
   }
-
-  void TearDown() override { std::filesystem::remove_all(folder_); }
 
   void write_photo(const std::string& name, const cv::Mat& grey) const {
     const auto bytes = encode_png(grey);
@@ -72,13 +61,15 @@ class Calibrate : public ::testing::Test {
     }
   }
 
-  [[nodiscard]] std::string photos() const { return (folder_ / "photos").string(); }
+  [[nodiscard]] std::string photos() const { return path("photos"); }
 
-  [[nodiscard]] std::string profile() const { return (folder_ / "camera.toml").string(); }
+  [[nodiscard]] std::string profile() const { return path("camera.toml"); }
 
-  [[nodiscard]] std::string output_option() const { return " --output " + profile(); }
-
-  std::filesystem::path folder_;
+  /// `trigmesh calibrate` on the photographs, with these options besides.
+  [[nodiscard]] Outcome run(std::vector<std::string> options) const {
+    options.insert(options.begin(), {photos(), "--output", profile()});
+    return calibrate(std::move(options));
+  }
 };
 
 Camera wide_camera() {
@@ -109,8 +100,7 @@ void expect_near(const Camera& found, const Camera& truth) {
 TEST_F(Calibrate, ChessboardPhotographsGiveAProfile) {
   write_photos(wide_camera(), chessboard(), 8);
   write_photo("wall.png", cv::Mat(480, 640, CV_8UC1, cv::Scalar(100)));
-  const Outcome outcome = run_trigmesh("calibrate " + photos() +
-                                       " --board 9x6 --square 25mm --name rig" + output_option());
+  const Outcome outcome = run({"--board", "9x6", "--square", "25mm", "--name", "rig"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
   EXPECT_THAT(outcome.output, HasSubstr("wall.png: no chessboard of 9x6"));
   EXPECT_THAT(outcome.output, HasSubstr("rms 0."));
@@ -129,10 +119,16 @@ TEST_F(Calibrate, CharucoPhotographsGiveAProfile) {
                     .marker_m = 0.022,
                     .dictionary = {.bits = 4, .count = 50}};
   write_photos(wide_camera(), board, 8);
-  const Outcome outcome = run_trigmesh(
-      "calibrate " + photos() +
-      " --target charuco --board 9x7 --square 3cm --marker-size 22mm --dictionary DICT_4X4_50" +
-      output_option());
+  const Outcome outcome = run({"--target",
+                               "charuco",
+                               "--board",
+                               "9x7",
+                               "--square",
+                               "3cm",
+                               "--marker-size",
+                               "22mm",
+                               "--dictionary",
+                               "DICT_4X4_50"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
   const auto profiles = read_camera_file(profile());
   ASSERT_TRUE(profiles.has_value());
@@ -143,8 +139,7 @@ TEST_F(Calibrate, PhotographsWithoutBoardAreNamedAndNothingIsWritten) {
   for (const char* name : {"a.png", "b.png", "c.png"}) {
     write_photo(name, cv::Mat(120, 160, CV_8UC1, cv::Scalar(100)));
   }
-  const Outcome outcome =
-      run_trigmesh("calibrate " + photos() + " --board 9x6 --square 25mm" + output_option());
+  const Outcome outcome = run({"--board", "9x6", "--square", "25mm"});
   EXPECT_EQ(outcome.exit_code, 4);
   EXPECT_THAT(outcome.output, HasSubstr("found in 0 of 3 photographs"));
   EXPECT_THAT(outcome.output, HasSubstr("b.png: no chessboard"));
@@ -157,26 +152,23 @@ TEST_F(Calibrate, PhotographsOfDifferentSizesAreRefused) {
   small.width_px = 600;
   const auto pose = test_support::board_pose({0.2, 0.125}, 0.5, {0.0, 0.0}, {10, 10, 0});
   write_photo("small.png", PlaneRenderer(small).render(board_pattern(chessboard()), pose, 1.0, 1));
-  const Outcome outcome =
-      run_trigmesh("calibrate " + photos() + " --board 9x6 --square 25mm" + output_option());
+  const Outcome outcome = run({"--board", "9x6", "--square", "25mm"});
   EXPECT_EQ(outcome.exit_code, 2);
   EXPECT_THAT(outcome.output, HasSubstr("600x480"));
 }
 
 TEST_F(Calibrate, WrongOptionsAreNamed) {
-  const std::string base = "calibrate " + photos() + output_option();
-  EXPECT_THAT(run_trigmesh(base + " --board nine --square 25mm").output,
-              HasSubstr("--board is 'nine'"));
-  EXPECT_THAT(run_trigmesh(base + " --board 9x6 --square 25").output, HasSubstr("with its unit"));
-  EXPECT_THAT(run_trigmesh(base + " --board 9x6 --square 25mm --model plenoptic").output,
+  EXPECT_THAT(run({"--board", "nine", "--square", "25mm"}).output, HasSubstr("--board is 'nine'"));
+  EXPECT_THAT(run({"--board", "9x6", "--square", "25"}).output, HasSubstr("with its unit"));
+  EXPECT_THAT(run({"--board", "9x6", "--square", "25mm", "--model", "plenoptic"}).output,
               HasSubstr("kannala-brandt"));
-  EXPECT_THAT(run_trigmesh(base + " --board 9x6 --square 25mm --target charuco").output,
+  EXPECT_THAT(run({"--board", "9x6", "--square", "25mm", "--target", "charuco"}).output,
               HasSubstr("--marker-size"));
-  EXPECT_EQ(run_trigmesh(base + " --board 9x6 --square 25").exit_code, 2);
+  EXPECT_EQ(run({"--board", "9x6", "--square", "25"}).exit_code, 2);
 }
 
 TEST_F(Calibrate, HelpHasExamples) {
-  const Outcome outcome = run_trigmesh("calibrate --help");
+  const Outcome outcome = calibrate({"--help"});
   EXPECT_EQ(outcome.exit_code, 0);
   EXPECT_THAT(
       outcome.output,
@@ -185,15 +177,14 @@ TEST_F(Calibrate, HelpHasExamples) {
 
 TEST_F(Calibrate, RealPhotographsComeCloseToOpenCvsResult) {
   const char* data = std::getenv("TRIGMESH_DATA");
-  const auto root = data != nullptr
-                        ? std::filesystem::path(data)
-                        : std::filesystem::path(TRIGMESH_SOURCE_DIR) / ".." / "shared" / "data";
+  const auto root =
+      data != nullptr ? std::filesystem::path(data) : test_support::source_path("../shared/data");
   const auto images = root / "calib_chessboard_left" / "images";
   if (!std::filesystem::exists(images)) {
     GTEST_SKIP() << "no calib_chessboard_left under " << root << "; set TRIGMESH_DATA";
   }
   const Outcome outcome =
-      run_trigmesh("calibrate " + images.string() + " --board 9x6 --square 25mm" + output_option());
+      calibrate({images.string(), "--board", "9x6", "--square", "25mm", "--output", profile()});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
   const auto profiles = read_camera_file(profile());
   ASSERT_TRUE(profiles.has_value());
