@@ -20,7 +20,7 @@ using Buffer = fmt::memory_buffer;
 
 template <typename Values>
 void append_line(Buffer& out, const Values& values) {
-  std::string_view separator;
+  std::string_view separator = "";
   for (const double value : values) {
     fmt::format_to(std::back_inserter(out), FMT_COMPILE("{}{}"), separator, value);
     separator = " ";
