@@ -2,6 +2,11 @@
 // eigenvector of A^T A, A of the two independent rows of x2 x (H x1) = 0 (R. Hartley, A. Zisserman,
 // "Multiple View Geometry", 2nd edition 2003, algorithm 4.2). Turning on the spot gives H ~ K2 R
 // K1^-1 (equation 8.3 there).
+//
+// The two motions of a plane n.X = 1: with H = R (I + t n^T), |n| = 1, the symmetric matrix H^T H -
+// I = n w^T + w n^T, w = t + |t|^2 / 2 n, is the same when n and w change places (the twofold
+// ambiguity of H. C. Longuet-Higgins, "The visual ambiguity of a moving plane", Proc. R. Soc. B
+// 223, 1984).
 #include "sfm/geometry/homography.hpp"
 
 #include <cmath>
@@ -133,6 +138,39 @@ std::optional<RotationFromHomography> rotation_from_homography(
   const Eigen::Matrix3d rotation = svd.matrixU() * svd.matrixV().transpose();
   return RotationFromHomography{Eigen::Quaterniond(rotation).normalized(),
                                 (svd.singularValues().array() - 1.0).abs().maxCoeff()};
+}
+
+std::optional<Rigid3> other_motion_of_plane(const Eigen::Matrix3d& second_from_first_normalized,
+                                            const Rigid3& second_from_first) {
+  constexpr double kSmallest = 1e-9;
+  const Eigen::Vector3d scales =
+      Eigen::JacobiSVD<Eigen::Matrix3d>(second_from_first_normalized).singularValues();
+  if (!(scales[2] > kSmallest * scales[0])) {
+    return std::nullopt;
+  }
+  const Eigen::Matrix3d h = second_from_first_normalized /
+                            std::copysign(scales[1], second_from_first_normalized.determinant());
+  const Eigen::Matrix3d turn = second_from_first.rotation.toRotationMatrix();
+  const Eigen::JacobiSVD<Eigen::Matrix3d> shift(turn.transpose() * h - Eigen::Matrix3d::Identity(),
+                                                Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const double length = shift.singularValues()[0];
+  const Eigen::Vector3d normal = shift.matrixV().col(0);
+  const double bend = 0.5 * length * length;
+  const Eigen::Vector3d w = length * shift.matrixU().col(0) + bend * normal;
+  if (!(w.norm() > kSmallest)) {
+    return std::nullopt;
+  }
+  const Eigen::Vector3d other_normal = w.normalized();
+  const Eigen::Vector3d other_shift = w.norm() * normal - bend * other_normal;
+  const Eigen::Matrix3d stretch =
+      Eigen::Matrix3d::Identity() + other_shift * other_normal.transpose();
+  if (!(std::abs(stretch.determinant()) > kSmallest)) {
+    return std::nullopt;
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(h * stretch.inverse(),
+                                              Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::Matrix3d rotation = svd.matrixU() * svd.matrixV().transpose();
+  return Rigid3{Eigen::Quaterniond(rotation).normalized(), (rotation * other_shift).normalized()};
 }
 
 }  // namespace trigmesh

@@ -7,6 +7,8 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "sfm/geometry/rigid3.hpp"
+
 namespace trigmesh {
 
 enum class HomographyOutcome {
@@ -52,5 +54,11 @@ struct RotationFromHomography {
     const Eigen::Matrix3d& second_from_first,
     const Eigen::Matrix3d& first_calibration,
     const Eigen::Matrix3d& second_calibration);
+
+/// A plane seen from two places is explained by two motions. Given one of them and the homography
+/// of the plane in normalised coordinates (x/z, y/z), second ~ H first, the other one; |t| = 1.
+/// Nothing when the homography is singular or the motion has no translation that it needs.
+[[nodiscard]] std::optional<Rigid3> other_motion_of_plane(
+    const Eigen::Matrix3d& second_from_first_normalized, const Rigid3& second_from_first);
 
 }  // namespace trigmesh

@@ -12,6 +12,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -22,6 +23,7 @@
 #include "sfm/geometry/epipolar.hpp"
 #include "sfm/geometry/essential.hpp"
 #include "sfm/geometry/five_point.hpp"
+#include "sfm/geometry/homography.hpp"
 #include "sfm/geometry/robust_score.hpp"
 
 namespace trigmesh {
@@ -91,14 +93,19 @@ struct Candidate {
   Score score{};
 };
 
-/// Fits to the inliers and looks again who they are, as long as the cost falls.
+/// Fits to the inliers and looks again who they are, as long as the cost falls. Begins with those
+/// within twice the limit: a sample of five noisy matches leaves many right ones just outside of
+/// it.
 Candidate improve(const Matches& matches, const Eigen::Matrix3d& essential, double max_error_px) {
   constexpr int kRounds = 4;
   constexpr int kSteps = 10;
   constexpr double kWorthwhile = 1e-4;
+  constexpr double kWide = 2.0;
   Candidate best{.second_from_first = decompose_essential(essential)[0]};
   InlierMask mask(matches.size(), 0);
   best.score = mark_inliers(mask, max_error_px, PixelError(matches, essential));
+  (void)mark_inliers(
+      mask, kWide * max_error_px, PixelError(matches, essential));  // for the mask alone
   for (int round = 0; round < kRounds && best.score.inliers >= kMinMatches; ++round) {
     const Rigid3 refined =
         refine_relative_pose(best.second_from_first,
@@ -258,6 +265,45 @@ RelativePose conclude(const Matches& matches,
   return out;
 }
 
+/// The other motion of the plane on which the inliers lie, improved on them; nothing when they lie
+/// on none.
+std::optional<Candidate> plane_twin(const Matches& matches,
+                                    const Candidate& best,
+                                    double max_error_px) {
+  InlierMask mask(matches.size(), 0);
+  const PixelError error(matches, essential_from_pose(best.second_from_first));
+  const Score score = mark_inliers(mask, max_error_px, error);
+  const HomographyEstimate plane = estimate_homography(matches.first, matches.second, mask);
+  if (score.inliers < kMinMatches || plane.outcome != HomographyOutcome::kOk) {
+    return std::nullopt;
+  }
+  const auto twin = other_motion_of_plane(plane.second_from_first, best.second_from_first);
+  return twin ? std::optional(improve(matches, essential_from_pose(*twin), max_error_px))
+              : std::nullopt;
+}
+
+/// The epipolar error cannot tell the two motions of a plane apart. Where the better one by error
+/// leaves matches behind a camera, the other one is tried, and the one with more in front wins.
+RelativePose conclude_with_twin(const Matches& matches,
+                                const Candidate& best,
+                                std::size_t caller_size,
+                                const RelativePoseOptions& options) {
+  constexpr double kNearlyAll = 0.98;
+  RelativePose out = conclude(matches, best, caller_size, options);
+  const bool left_behind =
+      static_cast<double>(out.inlier_count) < kNearlyAll * static_cast<double>(best.score.inliers);
+  if (out.outcome == RelativePoseOutcome::kNoParallax || !left_behind) {
+    return out;
+  }
+  if (const auto twin = plane_twin(matches, best, options.max_error_px)) {
+    RelativePose other = conclude(matches, *twin, caller_size, options);
+    if (other.outcome == RelativePoseOutcome::kOk && other.inlier_count > out.inlier_count) {
+      return other;
+    }
+  }
+  return out;
+}
+
 FivePointSolutions essentials_of_sample(const Matches& matches,
                                         const std::array<std::uint32_t, kSampleSize>& sample) {
   std::array<Eigen::Vector3d, kSampleSize> first;
@@ -343,7 +389,7 @@ RelativePose estimate_relative_pose(const Camera& first_camera,
                                    options.max_iterations);
     }
   }
-  RelativePose out = conclude(matches, best, first_pixels.size(), options);
+  RelativePose out = conclude_with_twin(matches, best, first_pixels.size(), options);
   out.iterations = iteration;
   return out;
 }
@@ -361,7 +407,7 @@ RelativePose relative_pose_from_fundamental(const Eigen::Matrix3d& fundamental,
   }
   const Eigen::Matrix3d essential = enforce_essential(essential_from_fundamental(
       fundamental, matches.calibrations.first, matches.calibrations.second));
-  return conclude(
+  return conclude_with_twin(
       matches, improve(matches, essential, options.max_error_px), first_pixels.size(), options);
 }
 

@@ -66,7 +66,7 @@ CalibrationView exact_view(const Camera& camera,
         pixel->y() < camera.height_px - 1.0) {
       view.board_m.push_back(place);
       view.pixels.emplace_back(*pixel +
-                               noise_px * Eigen::Vector2d(random.normal(), random.normal()));
+                               noise_px * Eigen::Vector2d{random.normal(), random.normal()});
     }
   }
   return view;

@@ -37,6 +37,14 @@ class Random {
     return sigma * Eigen::Vector2d(x, y);
   }
 
+  /// Uniform in [0, width) x [0, height). The order of the two calls is fixed; that of arguments is
+  /// not.
+  Eigen::Vector2d in_rectangle(double width, double height) {
+    const double x = uniform(0.0, width);
+    const double y = uniform(0.0, height);
+    return {x, y};
+  }
+
   Eigen::Vector3d in_box(double half) {
     const double x = uniform(-half, half);
     const double y = uniform(-half, half);

@@ -44,8 +44,7 @@ inline TwoViewMatches make_two_view(Random& random, const TwoViewOptions& option
       static_cast<std::size_t>(options.outlier_ratio * static_cast<double>(options.count));
   const Camera& camera = options.camera;
   while (out.first_px.size() < options.count) {
-    const Eigen::Vector2d any(random.uniform(0.0, camera.width_px),
-                              random.uniform(0.0, camera.height_px));
+    const Eigen::Vector2d any = random.in_rectangle(camera.width_px, camera.height_px);
     const auto uv = normalize_pixel(camera, any);
     if (!uv) {
       continue;
@@ -65,7 +64,7 @@ inline TwoViewMatches make_two_view(Random& random, const TwoViewOptions& option
     }
     Eigen::Vector2d second = *pixel + random.gauss2(options.noise_px);
     if (out.first_px.size() < wrong) {
-      second = {random.uniform(0.0, camera.width_px), random.uniform(0.0, camera.height_px)};
+      second = random.in_rectangle(camera.width_px, camera.height_px);
     }
     const Eigen::Vector2d first = any + random.gauss2(options.noise_px);
     const auto first_uv = normalize_pixel(camera, first);

@@ -258,7 +258,7 @@ Scene with_wrong_keypoints(Scene scene, double ratio) {
     for (Eigen::Vector2f& keypoint : view.keypoints_px) {
       if (random.uniform() < ratio) {
         const Eigen::Vector2d move = random.uniform(10.0, 100.0) *
-                                     Eigen::Vector2d(random.normal(), random.normal()).normalized();
+                                     Eigen::Vector2d{random.normal(), random.normal()}.normalized();
         keypoint += move.cast<float>();
       }
     }
@@ -292,7 +292,7 @@ TEST(BundleAdjustment, SigmasTakeTheWeightFromBadKeypoints) {
     for (std::size_t i = 0; i < sigma.size(); i += 2) {
       sigma[i] = 5.0F;
       view.keypoints_px[i] +=
-          Eigen::Vector2d(5.0 * random.normal(), 5.0 * random.normal()).cast<float>();
+          Eigen::Vector2d{5.0 * random.normal(), 5.0 * random.normal()}.cast<float>();
     }
   }
   Scene plain = start;
