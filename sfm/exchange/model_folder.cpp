@@ -52,15 +52,25 @@ Error in_folder(Error error, const fs::path& folder) {
   return error;
 }
 
+/// What stands in a points3D file without points: nothing, or a count of zero.
+std::string no_points(std::string_view extension) {
+  return extension == ".bin" ? std::string(sizeof(std::uint64_t), '\0') : std::string();
+}
+
 template <typename Contents>
 Result<Contents> read_contents(const fs::path& folder, std::string_view extension) {
   const auto read = [&](std::string_view name) {
     return read_file(folder / (std::string(name) += extension), kMaxModelFileBytes);
   };
   Contents contents;
+  contents.points = no_points(extension);
   TM_ASSIGN_OR_RETURN(contents.cameras, read("cameras"));
   TM_ASSIGN_OR_RETURN(contents.images, read("images"));
-  TM_ASSIGN_OR_RETURN(contents.points, read("points3D"));
+  auto points = read("points3D");
+  if (!points && points.error().code == ErrorCode::kNotFound) {
+    return contents;  // cameras and poses alone; the images then name no points
+  }
+  TM_ASSIGN_OR_RETURN(contents.points, std::move(points));
   return contents;
 }
 

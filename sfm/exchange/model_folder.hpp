@@ -11,7 +11,7 @@ namespace trigmesh {
 
 /// Reads the model in a folder of COLMAP files, text or binary (text when both are there). `path`
 /// may be that folder, or one that holds it as `sparse`, `model/sparse` or `sparse/0`: a result of
-/// ours, its model folder, a workspace of COLMAP. kNotFound, with the places that were tried, when
+/// ours, its model folder, a workspace of COLMAP. Without a points3D file the model has no points. kNotFound, with the places that were tried, when
 /// there is none.
 [[nodiscard]] Result<Scene> read_model(const std::filesystem::path& path);
 

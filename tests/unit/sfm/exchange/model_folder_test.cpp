@@ -72,6 +72,23 @@ TEST_F(ModelFolder, IsNamedWhenAFileInItIsDamaged) {
   EXPECT_THAT(read.error().message, HasSubstr(folder_.string() + ": points3D.txt, line 1"));
 }
 
+TEST_F(ModelFolder, NeedsNoPoints) {
+  ASSERT_TRUE(
+      write_file_atomically(folder_ / "images.txt", "1 1 0 0 0 1 2 3 1 a.jpg\n\n").has_value());
+  ASSERT_TRUE(write_file_atomically(folder_ / "cameras.txt", "1 PINHOLE 640 480 500 500 320 240\n")
+                  .has_value());
+  const auto text = read_model(folder_);
+  ASSERT_TRUE(text.has_value()) << text.error().message;
+  EXPECT_EQ(text->registered_count(), 1U);
+  EXPECT_TRUE(text->landmarks.empty());
+  const fs::path binary = folder_ / "binary";
+  ASSERT_TRUE(write_binary_model(*text, binary).has_value());
+  fs::remove(binary / "points3D.bin");
+  const auto bytes = read_model(binary);
+  ASSERT_TRUE(bytes.has_value()) << bytes.error().message;
+  EXPECT_EQ(bytes->registered_count(), 1U);
+}
+
 TEST_F(ModelFolder, GivesPosesWithoutPoints) {
   ASSERT_TRUE(
       write_file_atomically(folder_ / "images.txt", "1 1 0 0 0 1 2 3 1 a.jpg\n\n").has_value());
