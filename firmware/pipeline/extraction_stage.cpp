@@ -5,7 +5,7 @@
 #include <fmt/format.h>
 
 #include "firmware/base/check.hpp"
-#include "firmware/pipeline/reconstruction.hpp"
+#include "firmware/pipeline/photo_set.hpp"
 
 namespace trigmesh {
 
@@ -31,7 +31,16 @@ class PhotoWorker {
     if (!file) {
       return ExtractedImage{std::nullopt, file.error()};
     }
-    const std::uint64_t key = content_hash(*file, settings_);
+    std::uint64_t key = content_hash(*file, settings_);
+    std::optional<std::vector<std::uint8_t>> mask;
+    if (photos_.read_mask) {
+      auto read = photos_.read_mask(i);
+      if (!read) {
+        return ExtractedImage{std::nullopt, read.error()};
+      }
+      mask = std::move(*read);
+      key = mask ? content_hash(*mask, key) : key;
+    }
     const std::string checkpoint = fmt::format("features-{:06}", i);
     if (auto stored = from_checkpoint(checkpoint, key)) {
       return ExtractedImage{std::move(stored), {}};
@@ -39,6 +48,13 @@ class PhotoWorker {
     auto extracted = extract_image_features(*file, extractor_);
     if (!extracted) {
       return ExtractedImage{std::nullopt, extracted.error()};
+    }
+    if (mask) {
+      const auto usable = load_mask(photos_, i, extracted->width_px, extracted->height_px);
+      if (!usable) {
+        return ExtractedImage{std::nullopt, usable.error()};
+      }
+      drop_masked_features(*usable, *extracted);
     }
     TM_RETURN_IF_ERROR(
         context_.checkpoints.save(checkpoint, key, encode_image_features(*extracted)));

@@ -109,4 +109,27 @@ Result<ImageFeatures> extract_image_features(std::span<const std::uint8_t> file,
   return image;
 }
 
+void drop_masked_features(const cv::Mat& mask, ImageFeatures& image) {
+  FeatureSet& features = image.features;
+  const std::size_t bytes = features.descriptor_bytes;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < features.size(); ++i) {
+    const Keypoint& keypoint = features.keypoints[i];
+    const int x = std::clamp(static_cast<int>(std::lround(keypoint.x_px)), 0, mask.cols - 1);
+    const int y = std::clamp(static_cast<int>(std::lround(keypoint.y_px)), 0, mask.rows - 1);
+    if (mask.at<std::uint8_t>(y, x) == 0) {
+      continue;
+    }
+    features.keypoints[kept] = keypoint;
+    image.colors[kept] = image.colors[i];
+    std::copy_n(features.descriptors.begin() + static_cast<std::ptrdiff_t>(i * bytes),
+                bytes,
+                features.descriptors.begin() + static_cast<std::ptrdiff_t>(kept * bytes));
+    ++kept;
+  }
+  features.keypoints.resize(kept);
+  image.colors.resize(kept);
+  features.descriptors.resize(kept * bytes);
+}
+
 }  // namespace trigmesh

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include <opencv2/core/mat.hpp>
+
 #include "firmware/base/result.hpp"
 #include "sfm/features/features.hpp"
 
@@ -33,5 +35,8 @@ struct ImageFeatures {
 /// decoding and extraction.
 [[nodiscard]] Result<ImageFeatures> extract_image_features(std::span<const std::uint8_t> file,
                                                            const FeatureExtractor& extractor);
+
+/// Takes out the keypoints whose pixel is 0 in the mask (CV_8UC1 of the photograph's size).
+void drop_masked_features(const cv::Mat& mask, ImageFeatures& image);
 
 }  // namespace trigmesh

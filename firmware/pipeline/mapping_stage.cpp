@@ -1,22 +1,15 @@
 #include "firmware/pipeline/mapping_stage.hpp"
 
-#include <algorithm>
-#include <numeric>
+#include <cmath>
+#include <functional>
+#include <map>
 
 #include "firmware/base/check.hpp"
+#include "sfm/mapping/known_poses.hpp"
 
 namespace trigmesh {
 
 namespace {
-
-std::vector<std::size_t> strongest_first(const std::vector<PairRecord>& pairs) {
-  std::vector<std::size_t> order(pairs.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return pairs[a].geometry.inliers.size() > pairs[b].geometry.inliers.size();
-  });
-  return order;
-}
 
 void color_landmarks(Scene& scene, const std::vector<ExtractedImage>& images) {
   for (Landmark& landmark : scene.landmarks) {
@@ -46,7 +39,129 @@ RefusalReason reason_of(ErrorCode code) {
   }
 }
 
+/// What was wrong with photographs that could not be read.
+void tell_unreadable(const std::vector<ExtractedImage>& images, MappedPhotos& result) {
+  for (Scene& scene : result.components) {
+    color_landmarks(scene, images);
+  }
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    if (!images[i].features) {
+      result.outcomes[i].reason = reason_of(images[i].error.code);
+      result.outcomes[i].detail = images[i].error.message;
+    }
+  }
+}
+
+/// Outcome of an image whose pose was given or not.
+ImageOutcome outcome_of(const Scene& scene, const View& view, std::size_t features) {
+  ImageOutcome outcome;
+  outcome.name = view.name;
+  outcome.features = features;
+  if (!view.cam_from_world) {
+    outcome.reason = RefusalReason::kNoGivenPose;
+    outcome.detail = "the given model has no pose for it";
+    return outcome;
+  }
+  outcome.component = 0;
+  double squares = 0.0;
+  for (std::size_t k = 0; k < view.landmarks.size(); ++k) {
+    if (view.landmarks[k] == kNoLandmark) {
+      continue;
+    }
+    ++outcome.observations;
+    const Eigen::Vector3d in_cam =
+        *view.cam_from_world * scene.landmarks[index(view.landmarks[k])].position_in_world;
+    if (const auto pixel = project(scene.cameras[index(view.camera)], in_cam)) {
+      squares += (*pixel - view.keypoints_px[k].cast<double>()).squaredNorm();
+    }
+  }
+  if (outcome.observations > 0) {
+    outcome.rmse_px = std::sqrt(squares / static_cast<double>(outcome.observations));
+  }
+  return outcome;
+}
+
+MapperImage mapper_image(const std::string& name, CameraId camera, const ExtractedImage& image) {
+  return {
+      name, camera, image.features ? image.features->features.keypoints : std::vector<Keypoint>{}};
+}
+
 }  // namespace
+
+Result<MappedPhotos> map_known_poses(const PhotoSet& photos,
+                                     const std::vector<ExtractedImage>& images,
+                                     const CameraGroups& cameras,
+                                     const std::vector<PairRecord>& pairs,
+                                     const KnownPoseMapping& mapping,
+                                     const StageContext& context) {
+  std::map<std::string, Rigid3, std::less<>> poses;
+  for (const View& view : mapping.model.views) {
+    if (view.cam_from_world) {
+      poses.emplace(view.name, *view.cam_from_world);
+    }
+  }
+  std::vector<Camera> group_cameras;
+  for (const CameraGroup& group : cameras.groups) {
+    group_cameras.push_back(group.camera);
+  }
+  std::vector<PosedImage> posed;
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    PosedImage image{mapper_image(photos.names[i], cameras.group_of_image[i], images[i]), {}};
+    if (const auto pose = poses.find(photos.names[i]); pose != poses.end() && images[i].features) {
+      image.cam_from_world = pose->second;
+    }
+    posed.push_back(std::move(image));
+  }
+  context.listener.on_progress({Stage::kMap, 0, images.size()});
+  TM_ASSIGN_OR_RETURN(
+      Scene scene,
+      triangulate_known_poses(group_cameras, posed, pairs, mapping.options, context.executor));
+  context.listener.on_progress({Stage::kMap, images.size(), images.size()});
+  if (scene.registered_count() == 0) {
+    return fail(ErrorCode::kInsufficientData,
+                "none of the {} photographs has a pose in the given model: names must be equal, "
+                "relative to the image folder",
+                images.size());
+  }
+  MappedPhotos result;
+  for (const View& view : scene.views) {
+    const std::size_t i = result.outcomes.size();
+    result.outcomes.push_back(outcome_of(scene, view, posed[i].image.keypoints.size()));
+  }
+  result.components.push_back(std::move(scene));
+  tell_unreadable(images, result);
+  return result;
+}
+
+Result<CameraGroups> groups_of_model(const PhotoSet& photos,
+                                     const std::vector<ExtractedImage>& images,
+                                     const Scene& model) {
+  std::map<std::string, CameraId, std::less<>> camera_of;
+  for (const View& view : model.views) {
+    camera_of.emplace(view.name, view.camera);
+  }
+  CameraGroups groups;
+  for (const Camera& camera : model.cameras) {
+    groups.groups.push_back({camera, IntrinsicsKnowledge::kGiven});
+  }
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    const auto found = camera_of.find(photos.names[i]);
+    groups.group_of_image.push_back(found == camera_of.end() ? CameraId{0} : found->second);
+    const Camera& camera = model.cameras[index(groups.group_of_image.back())];
+    if (found != camera_of.end() && images[i].features &&
+        (camera.width_px != images[i].features->width_px ||
+         camera.height_px != images[i].features->height_px)) {
+      return fail(ErrorCode::kInvalidArgument,
+                  "{} has {}x{} pixels, its camera in the given model {}x{}",
+                  photos.names[i],
+                  images[i].features->width_px,
+                  images[i].features->height_px,
+                  camera.width_px,
+                  camera.height_px);
+    }
+  }
+  return groups;
+}
 
 Result<MappedPhotos> map_photos(const PhotoSet& photos,
                                 const std::vector<ExtractedImage>& images,
@@ -59,11 +174,7 @@ Result<MappedPhotos> map_photos(const PhotoSet& photos,
     mapper.add_camera(group.camera, group.knowledge);
   }
   for (std::size_t i = 0; i < images.size(); ++i) {
-    MapperImage image{photos.names[i], cameras.group_of_image[i], {}};
-    if (images[i].features) {
-      image.keypoints = images[i].features->features.keypoints;
-    }
-    mapper.add_image(std::move(image));
+    mapper.add_image(mapper_image(photos.names[i], cameras.group_of_image[i], images[i]));
   }
   for (const std::size_t i : strongest_first(pairs)) {
     mapper.add_pair(pairs[i].pair, pairs[i].geometry);
@@ -77,15 +188,7 @@ Result<MappedPhotos> map_photos(const PhotoSet& photos,
   }
   mapper.finish();
   MappedPhotos result{mapper.components(), mapper.outcomes()};
-  for (Scene& scene : result.components) {
-    color_landmarks(scene, images);
-  }
-  for (std::size_t i = 0; i < images.size(); ++i) {
-    if (!images[i].features) {
-      result.outcomes[i].reason = reason_of(images[i].error.code);
-      result.outcomes[i].detail = images[i].error.message;
-    }
-  }
+  tell_unreadable(images, result);
   return result;
 }
 

@@ -27,4 +27,25 @@ struct MappedPhotos {
                                               const MapperOptions& options,
                                               const StageContext& context);
 
+/// A model whose cameras and poses are taken as they are.
+struct KnownPoseMapping {
+  const Scene& model;  ///< its points are not used
+  MapperOptions options;
+};
+
+/// The intrinsics of a given model, by the names of its images. kInvalidArgument when a photograph
+/// has another size than its camera.
+[[nodiscard]] Result<CameraGroups> groups_of_model(const PhotoSet& photos,
+                                                   const std::vector<ExtractedImage>& images,
+                                                   const Scene& model);
+
+/// Triangulates the matches from the poses of a given model; photographs that it does not name are
+/// refused. kInsufficientData when it names none.
+[[nodiscard]] Result<MappedPhotos> map_known_poses(const PhotoSet& photos,
+                                                   const std::vector<ExtractedImage>& images,
+                                                   const CameraGroups& cameras,
+                                                   const std::vector<PairRecord>& pairs,
+                                                   const KnownPoseMapping& mapping,
+                                                   const StageContext& context);
+
 }  // namespace trigmesh

@@ -47,7 +47,58 @@ class StagedFolder {
   std::filesystem::path path_;
 };
 
+Result<> write_reports(const std::filesystem::path& folder,
+                       std::span<const Scene> components,
+                       const ReconstructionReport& report,
+                       const ReportAttachments& attachments) {
+  TM_RETURN_IF_ERROR(write_file_atomically(folder / "report.json", render_report_json(report)));
+  return write_file_atomically(folder / "report.html",
+                               render_report_html(report, components, attachments));
+}
+
+/// The same files again under another folder, as links where the file system can, else as copies.
+Result<> link_tree(const std::filesystem::path& from, const std::filesystem::path& to) {
+  std::error_code error;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(from, error)) {
+    const std::filesystem::path target = to / entry.path().lexically_relative(from);
+    if (entry.is_directory()) {
+      TM_RETURN_IF_ERROR(make_directory(target));
+      continue;
+    }
+    std::filesystem::create_hard_link(entry.path(), target, error);
+    if (error) {
+      std::filesystem::copy_file(entry.path(), target, error);
+    }
+    if (error) {
+      return fail(error == std::errc::no_space_on_device ? ErrorCode::kNoSpace : ErrorCode::kIo,
+                  "cannot take {} over into the new model: {}",
+                  entry.path().string(),
+                  error.message());
+    }
+  }
+  if (error) {
+    return fail(ErrorCode::kIo, "cannot list the model {}: {}", from.string(), error.message());
+  }
+  return {};
+}
+
 }  // namespace
+
+Result<> extend_model(const std::filesystem::path& output,
+                      std::span<const NamedFile> files,
+                      std::span<const Scene> components,
+                      const ReconstructionReport& report,
+                      const ReportAttachments& attachments) {
+  const StagedFolder staged(output / ".model.part");
+  TM_RETURN_IF_ERROR(make_directory(staged.path()));
+  TM_RETURN_IF_ERROR(link_tree(output / "model", staged.path()));
+  // Files are replaced by rename, so the linked ones of the old model keep their bytes.
+  for (const NamedFile& file : files) {
+    TM_RETURN_IF_ERROR(write_file_atomically(staged.path() / file.name, file.bytes));
+  }
+  TM_RETURN_IF_ERROR(write_reports(staged.path(), components, report, attachments));
+  return replace_directory(staged.path(), output / "model");
+}
 
 Result<> write_model(const std::filesystem::path& output,
                      std::span<const Scene> components,
@@ -60,10 +111,7 @@ Result<> write_model(const std::filesystem::path& output,
     TM_RETURN_IF_ERROR(make_directory(folder / "sparse"));
     TM_RETURN_IF_ERROR(write_component(components[i], folder));
   }
-  TM_RETURN_IF_ERROR(
-      write_file_atomically(staged.path() / "report.json", render_report_json(report)));
-  TM_RETURN_IF_ERROR(
-      write_file_atomically(staged.path() / "report.html", render_report_html(report, components)));
+  TM_RETURN_IF_ERROR(write_reports(staged.path(), components, report, {}));
   return replace_directory(staged.path(), output / "model");
 }
 

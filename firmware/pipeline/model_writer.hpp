@@ -7,6 +7,8 @@
 #include "firmware/base/result.hpp"
 #include "firmware/pipeline/reconstruction.hpp"
 #include "firmware/pipeline/report.hpp"
+#include "firmware/pipeline/report_html.hpp"
+#include "sfm/exchange/obj.hpp"
 #include "sfm/scene/scene.hpp"
 
 namespace trigmesh {
@@ -18,6 +20,15 @@ namespace trigmesh {
 [[nodiscard]] Result<> write_model(const std::filesystem::path& output,
                                    std::span<const Scene> components,
                                    const ReconstructionReport& report);
+
+/// Adds files to `output`/model, or replaces those of the same name, and renews the reports, in one
+/// step: a reader sees the model as it was or with all of them. What else is in the folder stays.
+/// kIo, kNoSpace.
+[[nodiscard]] Result<> extend_model(const std::filesystem::path& output,
+                                    std::span<const NamedFile> files,
+                                    std::span<const Scene> components,
+                                    const ReconstructionReport& report,
+                                    const ReportAttachments& attachments = {});
 
 /// Writes `output`/timings.json: seconds per stage. Clock times live here and nowhere else.
 [[nodiscard]] Result<> write_timings(const std::filesystem::path& output,

@@ -11,10 +11,14 @@ enum class Stage {
   kSelectPairs,  ///< which images are worth comparing
   kMatch,        ///< pairs -> verified matches
   kMap,          ///< images -> poses and points
+  kDepth,        ///< views -> depth maps
+  kFuse,         ///< depth maps -> dense cloud
+  kSurface,      ///< depth maps -> mesh
+  kTexture,      ///< mesh and views -> textured mesh
   kWrite,        ///< model and report -> files
 };
 
-/// "features", "pairs", "matching", "mapping", "writing".
+/// "features", "pairs", "matching", "mapping", "depth", "fusion", "surface", "texture", "writing".
 [[nodiscard]] std::string_view to_string(Stage stage);
 
 /// How far a stage is. `total` may be 0 while it is not known.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <system_error>
 
 #include <fmt/format.h>
 
@@ -12,6 +13,8 @@
 #include "firmware/pipeline/matching_stage.hpp"
 #include "firmware/pipeline/memory_plan.hpp"
 #include "firmware/pipeline/model_writer.hpp"
+#include "firmware/pipeline/stopwatch.hpp"
+#include "firmware/pipeline/surface_building.hpp"
 #include "firmware/pipeline/worker_pool.hpp"
 #include "sfm/exchange/file_io.hpp"
 #include "sfm/exchange/image_codec.hpp"
@@ -21,25 +24,6 @@ namespace trigmesh {
 namespace {
 
 constexpr int kMaxThreads = 256;
-
-/// Measures the stages one after the other.
-class Stopwatch {
- public:
-  explicit Stopwatch(const Clock& clock) : clock_(&clock), last_(clock.now()) {}
-
-  void finish(Stage stage) {
-    const auto now = clock_->now();
-    times_.push_back({stage, now - last_});
-    last_ = now;
-  }
-
-  [[nodiscard]] std::vector<StageTime> times() const { return times_; }
-
- private:
-  const Clock* clock_;
-  std::chrono::nanoseconds last_;
-  std::vector<StageTime> times_;
-};
 
 /// Size of the largest photograph, from the headers of the files; files that cannot be read count
 /// as empty.
@@ -154,6 +138,35 @@ ReconstructionReport report_on(const PhotoSet& photos,
   return build_report(input);
 }
 
+/// A report on a model that comes without its history: which images were refused and how they
+/// matched is not known.
+ReconstructionReport report_on_model(const PhotoSet& photos,
+                                     const ReconstructionOptions& options,
+                                     const Scene& scene) {
+  std::vector<ImageOutcome> outcomes;
+  for (const View& view : scene.views) {
+    ImageOutcome outcome;
+    outcome.name = view.name;
+    outcome.features = view.keypoints_px.size();
+    outcome.component = view.cam_from_world ? 0 : -1;
+    outcome.reason = view.cam_from_world ? RefusalReason::kNone : RefusalReason::kNoGivenPose;
+    outcomes.push_back(std::move(outcome));
+  }
+  const std::vector<IntrinsicsOrigin> origins(scene.cameras.size(), IntrinsicsOrigin::kGiven);
+  ReportInput input;
+  input.components = std::span(&scene, 1);
+  input.images = outcomes;
+  input.intrinsics_origins = origins;
+  input.software_version = options.software_version;
+  input.input_description = photos.description;
+  return build_report(input);
+}
+
+/// Whether nothing that could still follow needs the work folder.
+bool is_finished(LastStage last) {
+  return last == LastStage::kSparse || last == LastStage::kTexture;
+}
+
 }  // namespace
 
 std::string_view to_string(Stage stage) {
@@ -166,6 +179,14 @@ std::string_view to_string(Stage stage) {
       return "matching";
     case Stage::kMap:
       return "mapping";
+    case Stage::kDepth:
+      return "depth";
+    case Stage::kFuse:
+      return "fusion";
+    case Stage::kSurface:
+      return "surface";
+    case Stage::kTexture:
+      return "texture";
     case Stage::kWrite:
       break;
   }
@@ -175,6 +196,7 @@ std::string_view to_string(Stage stage) {
 Result<> ReconstructionOptions::validate() const {
   TM_RETURN_IF_ERROR(features.validate());
   TM_RETURN_IF_ERROR(mapper.validate());
+  TM_RETURN_IF_ERROR(build.validate());
   if (num_threads < 1 || num_threads > kMaxThreads) {
     return fail(ErrorCode::kInvalidArgument,
                 "the number of threads is {}: it must be in [1, {}]",
@@ -211,7 +233,9 @@ Result<ReconstructionSummary> reconstruct(const PhotoSet& photos,
   refuse_duplicates(photos, images);
   TM_ASSIGN_OR_RETURN(
       const CameraGroups cameras,
-      group_cameras(grouping_images(photos, images), options.cameras, options.grouping));
+      options.poses
+          ? groups_of_model(photos, images, *options.poses)
+          : group_cameras(grouping_images(photos, images), options.cameras, options.grouping));
   stopwatch.finish(Stage::kExtract);
 
   const StageContext context{pool, checkpoints, listener, stop};
@@ -222,18 +246,54 @@ Result<ReconstructionSummary> reconstruct(const PhotoSet& photos,
 
   MapperOptions mapper = options.mapper;
   mapper.seed = options.seed;
-  TM_ASSIGN_OR_RETURN(const MappedPhotos mapped,
-                      map_photos(photos, images, cameras, pairs, mapper, context));
+  TM_ASSIGN_OR_RETURN(
+      const MappedPhotos mapped,
+      options.poses
+          ? map_known_poses(photos, images, cameras, pairs, {*options.poses, mapper}, context)
+          : map_photos(photos, images, cameras, pairs, mapper, context));
   stopwatch.finish(Stage::kMap);
 
   listener.on_progress({Stage::kWrite, 0, 1});
   ReconstructionSummary summary{report_on(photos, options, plan, cameras, pairs, mapped), {}};
   TM_RETURN_IF_ERROR(write_model(output, mapped.components, summary.report));
+  listener.on_progress({Stage::kWrite, 1, 1});
   stopwatch.finish(Stage::kWrite);
+  if (!mapped.components.empty()) {
+    const BuildInput input{photos, mapped.components, output, options};
+    TM_RETURN_IF_ERROR(build_surface(input, context, stopwatch, summary.report));
+  }
   summary.times = stopwatch.times();
   TM_RETURN_IF_ERROR(write_timings(output, summary.times));
-  checkpoints.discard();
-  listener.on_progress({Stage::kWrite, 1, 1});
+  if (is_finished(options.build.last_stage)) {
+    checkpoints.discard();
+  }
+  return summary;
+}
+
+Result<ReconstructionSummary> continue_model(const Scene& scene,
+                                             const PhotoSet& photos,
+                                             const std::filesystem::path& output,
+                                             const ReconstructionOptions& options,
+                                             const Clock& clock,
+                                             ProgressListener& listener,
+                                             const std::stop_token& stop) {
+  TM_RETURN_IF_ERROR(options.validate());
+  TM_RETURN_IF_ERROR(make_directory(output));
+  TM_ASSIGN_OR_RETURN(const CheckpointFolder checkpoints, CheckpointFolder::open(output / "work"));
+  WorkerPool pool(options.num_threads);
+  Stopwatch stopwatch(clock);
+  const std::vector<Scene> components{scene};
+  ReconstructionSummary summary{report_on_model(photos, options, scene), {}};
+  std::error_code error;
+  if (!std::filesystem::is_directory(output / "model", error)) {
+    TM_RETURN_IF_ERROR(write_model(output, components, summary.report));
+    stopwatch.finish(Stage::kWrite);
+  }
+  const StageContext context{pool, checkpoints, listener, stop};
+  TM_RETURN_IF_ERROR(
+      build_surface({photos, components, output, options}, context, stopwatch, summary.report));
+  summary.times = stopwatch.times();
+  TM_RETURN_IF_ERROR(write_timings(output, summary.times));
   return summary;
 }
 

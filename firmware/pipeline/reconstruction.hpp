@@ -3,7 +3,6 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -11,24 +10,17 @@
 
 #include "firmware/base/clock.hpp"
 #include "firmware/base/result.hpp"
+#include "firmware/pipeline/build_options.hpp"
 #include "firmware/pipeline/camera_groups.hpp"
+#include "firmware/pipeline/photo_set.hpp"
 #include "firmware/pipeline/progress.hpp"
 #include "firmware/pipeline/report.hpp"
+#include "firmware/pipeline/stopwatch.hpp"
 #include "sfm/features/features.hpp"
 #include "sfm/mapping/mapper.hpp"
 #include "sfm/matching/pair_selection.hpp"
 
 namespace trigmesh {
-
-/// The photographs of one reconstruction. Whatever they come from (folder, list, recording) looks
-/// like this here.
-struct PhotoSet {
-  std::vector<std::string> names;  ///< unique, in input order
-  bool ordered = false;            ///< neighbours in the list are neighbours in time
-  std::string description;         ///< for the report, e.g. "photo folder, 25 photographs"
-  /// The encoded bytes (JPEG or PNG) of a photograph. Thread-safe.
-  std::function<Result<std::vector<std::uint8_t>>(std::size_t)> read;
-};
 
 /// Settings of a reconstruction.
 struct ReconstructionOptions {
@@ -37,7 +29,9 @@ struct ReconstructionOptions {
   PairMode pair_mode = PairMode::kAuto;
   GroupingMode grouping = GroupingMode::kAuto;
   std::vector<Camera> cameras;  ///< given intrinsics; empty when none are known
+  std::optional<Scene> poses;   ///< given cameras and poses: nothing is solved but the points
   MapperOptions mapper;
+  BuildOptions build;  ///< what follows after mapping, and where it ends
   /// Threads that work, [1, 256]. The result does not depend on it.
   int num_threads = 1;
   /// Most memory to use, bytes; 0 for no limit. Quality is lowered in declared steps to keep it.
@@ -46,12 +40,6 @@ struct ReconstructionOptions {
   std::string software_version;
 
   [[nodiscard]] Result<> validate() const;
-};
-
-/// Time spent in each stage, for timings.json; never part of the model.
-struct StageTime {
-  Stage stage = Stage::kExtract;
-  std::chrono::nanoseconds duration{};
 };
 
 /// What a finished reconstruction says of itself.
@@ -75,5 +63,16 @@ struct ReconstructionSummary {
                                                         const Clock& clock,
                                                         ProgressListener& listener,
                                                         const std::stop_token& stop);
+
+/// The stages after mapping on a model that exists (ours or another program's, its photographs by
+/// the names of its images): adds their results to `output`/model, which is made when missing.
+/// Errors as above; kInsufficientData also when the model has no points.
+[[nodiscard]] Result<ReconstructionSummary> continue_model(const Scene& scene,
+                                                           const PhotoSet& photos,
+                                                           const std::filesystem::path& output,
+                                                           const ReconstructionOptions& options,
+                                                           const Clock& clock,
+                                                           ProgressListener& listener,
+                                                           const std::stop_token& stop);
 
 }  // namespace trigmesh

@@ -303,6 +303,14 @@ void decide_verdict(ReconstructionReport& report) {
   }
 }
 
+std::string units_sentence(std::optional<double> metres_per_unit) {
+  if (!metres_per_unit) {
+    return "Up to scale: lengths are in model units, because no metric reference was given. Ratios "
+           "and angles are valid.";
+  }
+  return fmt::format("Metric: one model unit is {:.6g} m.", *metres_per_unit);
+}
+
 void count_images(ReconstructionReport& report) {
   report.images_total = report.images.size();
   for (const ImageReport& image : report.images) {
@@ -358,9 +366,11 @@ ReconstructionReport build_report(const ReportInput& input) {
   ReconstructionReport report;
   report.software_version = input.software_version;
   report.input_description = input.input_description;
-  report.units_sentence =
-      "Up to scale: lengths are in model units, because no metric reference was given. Ratios and "
-      "angles are valid.";
+  report.metres_per_unit = input.metres_per_unit;
+  report.units_sentence = units_sentence(input.metres_per_unit);
+  report.dense = input.dense;
+  report.surface = input.surface;
+  report.texture = input.texture;
   report.reprojection_error_px = empty_histogram(0.0, kErrorBinPx, kErrorBins);
   report.track_length = empty_histogram(kTrackBinStart, 1.0, kTrackBins);
   report.triangulation_angle_deg = empty_histogram(0.0, kAngleBinDeg, kAngleBins);

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "firmware/pipeline/report_sections.hpp"
 #include "sfm/camera/camera.hpp"
 #include "sfm/matching/matches.hpp"
 #include "sfm/scene/outcome.hpp"
@@ -82,7 +83,11 @@ struct ReportInput {
   std::vector<ReportSetting> settings;
   std::vector<ReportNote> notes;
   std::string software_version;
-  std::string input_description;  ///< e.g. "folder fountain, 11 photographs"
+  std::string input_description;          ///< e.g. "folder fountain, 11 photographs"
+  std::optional<double> metres_per_unit;  ///< > 0, when the scale is known
+  std::optional<DenseSection> dense;      ///< of the main component, like the next two
+  std::optional<SurfaceSection> surface;
+  std::optional<TextureSection> texture;
 };
 
 /// One model: the images that are linked with each other.
@@ -131,6 +136,7 @@ struct ReconstructionReport {
   Verdict verdict = Verdict::kNotReady;
   std::string verdict_sentence;
   std::string units_sentence;
+  std::optional<double> metres_per_unit;
   std::size_t images_total = 0;
   std::size_t images_registered = 0;  ///< with a pose in the main component
   std::size_t images_in_other_components = 0;
@@ -143,6 +149,9 @@ struct ReconstructionReport {
   Histogram reprojection_error_px;
   Histogram track_length;             ///< images per point
   Histogram triangulation_angle_deg;  ///< per point: the largest angle between two of its rays
+  std::optional<DenseSection> dense;
+  std::optional<SurfaceSection> surface;
+  std::optional<TextureSection> texture;
   std::vector<ReportSetting> settings;
   std::vector<ReportNote>
       notes;  ///< errors first, then warnings, then infos; otherwise in the given order

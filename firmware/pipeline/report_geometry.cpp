@@ -8,6 +8,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "firmware/pipeline/base64.hpp"
+
 namespace trigmesh {
 namespace {
 
@@ -15,25 +17,6 @@ using Json = nlohmann::ordered_json;
 using Bytes = std::vector<std::uint8_t>;
 
 constexpr std::uint32_t kDropped = 0xFFFFFFFFU;
-
-/// RFC 4648 section 4.
-std::string base64(const Bytes& bytes) {
-  static constexpr std::string_view kDigits =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    const std::size_t available = std::min<std::size_t>(3, bytes.size() - i);
-    std::uint32_t block = 0;
-    for (std::size_t k = 0; k < 3; ++k) {
-      block = (block << 8U) | (k < available ? bytes[i + k] : 0U);
-    }
-    for (std::size_t k = 0; k < 4; ++k) {
-      text += k <= available ? kDigits[(block >> (18U - 6U * k)) & 63U] : '=';
-    }
-  }
-  return text;
-}
 
 void append_float(Bytes& bytes, double value) {
   const auto bits = std::bit_cast<std::uint32_t>(static_cast<float>(value));

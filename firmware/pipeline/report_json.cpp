@@ -113,6 +113,42 @@ Json to_json(const ReportNote& note) {
   return {{"severity", to_string(note.severity)}, {"text", note.text}};
 }
 
+Json to_json(const std::optional<double>& value, int digits) {
+  return value ? rounded(*value, digits) : Json(nullptr);
+}
+
+/// Lengths in scene units may be of any size, so they get significant digits.
+Json significant(double value) {
+  constexpr int kDigits = 6;
+  if (!std::isfinite(value) || value == 0.0) {
+    return std::isfinite(value) ? Json(0.0) : Json(nullptr);
+  }
+  const int magnitude = static_cast<int>(std::floor(std::log10(std::abs(value))));
+  const double scale = std::pow(10.0, kDigits - 1 - magnitude);
+  return std::isfinite(scale) && scale > 0.0 ? Json(std::round(value * scale) / scale)
+                                             : Json(value);
+}
+
+Json to_json(const DenseSection& dense) {
+  return {
+      {"views", dense.views},
+      {"map_width_px", dense.map_width_px},
+      {"map_height_px", dense.map_height_px},
+      {"filled_ratio", rounded(dense.filled_ratio, kRatioDigits)},
+      {"points", dense.points},
+      {"mean_view_count", rounded(dense.mean_view_count, kRatioDigits)},
+      {"lowered", dense.lowered},
+  };
+}
+
+Json to_json(const OpenHole& hole) {
+  const Eigen::Vector3d& center = hole.center_in_world;
+  return {
+      {"center", {significant(center.x()), significant(center.y()), significant(center.z())}},
+      {"perimeter", significant(hole.perimeter)},
+  };
+}
+
 template <typename T>
 Json list(const std::vector<T>& values) {
   Json array = Json::array();
@@ -120,6 +156,42 @@ Json list(const std::vector<T>& values) {
     array.push_back(to_json(value));
   }
   return array;
+}
+
+Json to_json(const SurfaceSection& surface) {
+  return {
+      {"vertices", surface.vertices},
+      {"faces", surface.faces},
+      {"components", surface.components},
+      {"area", significant(surface.area)},
+      {"seen_ratio", to_json(surface.seen_ratio, kRatioDigits)},
+      {"holes_filled", surface.holes_filled},
+      {"holes_open", surface.holes_open},
+      {"largest_holes", list(surface.largest_holes)},
+      {"lowered", surface.lowered},
+  };
+}
+
+Json to_json(const TextureSection& texture) {
+  return {
+      {"views_used", texture.views_used},
+      {"charts", texture.charts},
+      {"pages", texture.pages},
+      {"page_size_px", texture.page_size_px},
+      {"textured_ratio", rounded(texture.textured_ratio, kRatioDigits)},
+      {"held_out_views", texture.held_out_views},
+      {"psnr_db", to_json(texture.psnr_db, 2)},
+      {"ssim", to_json(texture.ssim, kRatioDigits)},
+      {"lowered", texture.lowered},
+  };
+}
+
+/// Stages that did not run have no member.
+template <typename T>
+void add_section(Json& document, const char* name, const std::optional<T>& section) {
+  if (section) {
+    document[name] = to_json(*section);
+  }
 }
 
 Json summary(const ReconstructionReport& report) {
@@ -139,13 +211,15 @@ Json summary(const ReconstructionReport& report) {
 }  // namespace
 
 std::string render_report_json(const ReconstructionReport& report) {
-  const Json document = {
+  Json document = {
       {"schema", kSchema},
       {"software", "trigmesh " + report.software_version},
       {"input", report.input_description},
       {"verdict", to_string(report.verdict)},
       {"verdict_sentence", report.verdict_sentence},
       {"units", report.units_sentence},
+      {"metres_per_unit",
+       report.metres_per_unit ? significant(*report.metres_per_unit) : Json(nullptr)},
       {"totals", summary(report)},
       {"notes", list(report.notes)},
       {"components", list(report.components)},
@@ -160,6 +234,9 @@ std::string render_report_json(const ReconstructionReport& report) {
        }},
       {"settings", list(report.settings)},
   };
+  add_section(document, "dense", report.dense);
+  add_section(document, "surface", report.surface);
+  add_section(document, "texture", report.texture);
   return document.dump(kIndent, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

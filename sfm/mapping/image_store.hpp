@@ -1,6 +1,9 @@
 #pragma once
 
+#include <algorithm>
+#include <numeric>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -16,6 +19,16 @@ struct PairRecord {
   ImagePair pair;
   TwoViewGeometry geometry;
 };
+
+/// Positions of the pairs, those with most inliers first: strong pairs make better tracks.
+[[nodiscard]] inline std::vector<std::size_t> strongest_first(std::span<const PairRecord> pairs) {
+  std::vector<std::size_t> order(pairs.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return pairs[a].geometry.inliers.size() > pairs[b].geometry.inliers.size();
+  });
+  return order;
+}
 
 /// How the last try to find the pose of an image ended.
 struct PoseAttempt {

@@ -30,6 +30,8 @@ std::string_view to_string(RefusalReason reason) {
       return "pose_unstable";
     case RefusalReason::kOtherComponent:
       return "other_component";
+    case RefusalReason::kNoGivenPose:
+      return "no_given_pose";
   }
   return "unknown";
 }
@@ -71,6 +73,9 @@ std::string_view advice(RefusalReason reason) {
     case RefusalReason::kOtherComponent:
       return "Take a chain of overlapping pictures from the main part to this one: both parts were "
              "built, but nothing links them.";
+    case RefusalReason::kNoGivenPose:
+      return "Add a pose for this picture to the given model, or leave out --poses so that it is "
+             "solved.";
   }
   return "";
 }

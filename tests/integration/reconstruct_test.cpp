@@ -81,6 +81,8 @@ class Reconstruct : public ScratchTest {
                                  "--output",
                                  path("out"),
                                  "--no-upsample",
+                                 "--stop-after",
+                                 "sparse",
                                  "--camera",
                                  (demo() / "gt/cameras.txt").string()};
     all.insert(all.end(), more.begin(), more.end());
@@ -93,7 +95,8 @@ class Reconstruct : public ScratchTest {
 
   /// Without a camera file, for pictures of any size.
   [[nodiscard]] ProgramResult run_plain(const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> all{"reconstruct", path("photos"), "--output", path("out")};
+    std::vector<std::string> all{
+        "reconstruct", path("photos"), "--output", path("out"), "--stop-after", "sparse"};
     all.insert(all.end(), more.begin(), more.end());
     return run_trigmesh(all, kTimeLimit);
   }

@@ -18,6 +18,7 @@
 #include <gtest/gtest.h>
 
 #include "firmware/pipeline/report_html.hpp"
+#include "tests/integration/sample_report.hpp"
 #include "tests/support/synthetic_scene.hpp"
 
 namespace trigmesh {
@@ -156,6 +157,42 @@ TEST_F(ReportPage, DrawsAModelWithoutWebgl) {
   expect_sound(visit);
   EXPECT_THAT(visit.dom, HasSubstr("data-renderer=\"2d\""));
   EXPECT_GT(drawn_pixels(visit), 1000);
+}
+
+TEST_F(ReportPage, DrawsTheMesh) {
+  const Visit visit = open(test_support::sample_report_page(), "#check");
+  expect_sound(visit);
+  EXPECT_THAT(visit.dom, HasSubstr("data-mesh=\"shown\""));
+  EXPECT_GT(drawn_pixels(visit), 20'000);
+  EXPECT_THAT(visit.dom, HasSubstr("Mesh of 2,208 faces with 2 pages of texture"));
+}
+
+TEST_F(ReportPage, SaysWhereTheMeshIsWithoutWebgl) {
+  const Visit visit = open(test_support::sample_report_page(), "#2d-check");
+  expect_sound(visit);
+  EXPECT_THAT(visit.dom, HasSubstr("data-mesh=\"no_webgl\""));
+  EXPECT_GT(drawn_pixels(visit), 1000) << "the points are drawn instead";
+  EXPECT_THAT(visit.dom, HasSubstr("open textured.glb beside this page"));
+}
+
+TEST_F(ReportPage, SaysWhereAMeshIsThatIsTooLarge) {
+  const Visit visit = open(test_support::sample_report_page_without_mesh(), "#check");
+  expect_sound(visit);
+  EXPECT_THAT(visit.dom, HasSubstr("data-mesh=\"too_large\""));
+  EXPECT_GT(drawn_pixels(visit), 1000);
+  EXPECT_THAT(visit.dom, HasSubstr("too large for this page (24.0 MB): open textured.glb"));
+}
+
+TEST_F(ReportPage, ShowsSurfaceAndDepthMaps) {
+  const Visit visit = open(test_support::sample_report_page(), "");
+  expect_sound(visit);
+  EXPECT_EQ(count_of(visit.dom, "<figure class=\"depth\">"),
+            std::size_t{test_support::kSampleDepthPictures});
+  EXPECT_EQ(count_of(visit.dom, "src=\"data:image/jpeg;base64,"),
+            std::size_t{3 * test_support::kSampleDepthPictures});
+  EXPECT_THAT(visit.dom, HasSubstr("27.4 dB"));
+  EXPECT_THAT(visit.dom, HasSubstr("2.01 m\xC2\xB2"));
+  EXPECT_THAT(visit.dom, HasSubstr("Depth maps at half the size of the photographs"));
 }
 
 TEST_F(ReportPage, ShowsHostileNamesAsText) {

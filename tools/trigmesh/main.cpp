@@ -11,6 +11,7 @@
 namespace {
 
 constexpr const char* kFooter = R"(Examples:
+  trigmesh reconstruct photos --output out
   trigmesh calibrate photos --board 9x6 --square 25mm --output camera.toml
   trigmesh evaluate out --truth truth/images.txt
   trigmesh export out --format colmap-binary --output out/colmap
@@ -30,13 +31,14 @@ Exit codes:
 
 void add_all_commands(CLI::App& app, trigmesh::CommandContext& context) {
   trigmesh::add_reconstruct_command(app, context);
+  trigmesh::add_surface_commands(app, context);
   trigmesh::add_calibrate_command(app, context);
   trigmesh::add_evaluate_command(app, context);
   trigmesh::add_export_command(app, context);
 }
 
 int run(int argc, char** argv) {
-  CLI::App app{"Photographs in, cameras and coloured point cloud out.", "trigmesh"};
+  CLI::App app{"Photographs in, cameras, coloured point cloud and textured mesh out.", "trigmesh"};
   app.set_version_flag("--version", "trigmesh " TRIGMESH_VERSION);
   app.require_subcommand(1);
   app.footer(kFooter);

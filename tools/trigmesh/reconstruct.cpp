@@ -1,20 +1,19 @@
-#include <algorithm>
-#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
-#include <thread>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include "drivers/camera/replay/recording.hpp"
 #include "firmware/base/check.hpp"
 #include "firmware/pipeline/reconstruction.hpp"
 #include "sfm/exchange/camera_profile.hpp"
+#include "sfm/exchange/model_folder.hpp"
 #include "tools/trigmesh/command.hpp"
 #include "tools/trigmesh/interrupt.hpp"
+#include "tools/trigmesh/photo_input.hpp"
 #include "tools/trigmesh/progress_printer.hpp"
+#include "tools/trigmesh/surface_arguments.hpp"
 
 namespace trigmesh {
 
@@ -24,11 +23,13 @@ constexpr const char* kFooter = R"(Examples:
   trigmesh reconstruct photos --output model
   trigmesh reconstruct photos --output model --camera rig.toml
   trigmesh reconstruct recording --output model --match sequential --threads 2
-  trigmesh reconstruct list.txt --output model --memory-limit 500M
+  trigmesh reconstruct photos --output model --preset preview
+  trigmesh reconstruct list.txt --output model --stop-after sparse --memory-limit 500M
 
 INPUT is a folder of JPEG or PNG photographs, a text file with one path a line, or a recording (a folder with
 images/ and, if there is one, timestamps.csv). The result is OUTPUT/model: sparse/ (COLMAP text), projections.txt,
-sparse.ply, report.json and report.html. When interrupted, the same command goes on where it stopped.
+sparse.ply, dense.ply, mesh.ply, textured.glb, textured.obj, report.json and report.html. When interrupted, the same
+command goes on where it stopped.
 )";
 
 /// The options as they come from the command line.
@@ -39,37 +40,14 @@ struct ReconstructArguments {
   std::string grouping = "auto";
   std::string features = "sift";
   std::string match = "auto";
-  std::string stop_after = "sparse";
-  int threads = 0;
+  std::string stop_after = "texture";
+  std::string poses;
   int max_features = FeatureOptions{}.max_keypoints;
   bool upright = false;
   bool no_upsample = false;
-  bool quiet = false;
-  std::uint64_t memory_limit_bytes = 0;
-  std::uint64_t seed = 0;
+  bool no_masks = false;
+  SurfaceArguments surface;
 };
-
-Result<PhotoSet> open_photos(const ReconstructArguments& arguments) {
-  RecordingOptions options;
-  options.subfolders = arguments.grouping == "folder" ? Subfolders::kInclude : Subfolders::kIgnore;
-  TM_ASSIGN_OR_RETURN(const Recording recording, Recording::open(arguments.input, options));
-  PhotoSet photos;
-  for (const RecordedFrame& frame : recording.frames()) {
-    photos.names.push_back(frame.name);
-  }
-  photos.ordered = recording.kind() == RecordingKind::kRecording &&
-                   recording.frames().front().timestamp.has_value();
-  const std::filesystem::path path = std::filesystem::path(arguments.input).lexically_normal();
-  const std::filesystem::path name =
-      path.has_filename() ? path.filename() : path.parent_path().filename();
-  photos.description = fmt::format(
-      "{}: {}, {} photographs", name.string(), to_string(recording.kind()), recording.size());
-  photos.read = [recording](std::size_t i) -> Result<std::vector<std::uint8_t>> {
-    TM_ASSIGN_OR_RETURN(Frame frame, recording.frame(i));
-    return std::move(frame.bytes);
-  };
-  return photos;
-}
 
 Result<ReconstructionOptions> options_from(const ReconstructArguments& arguments) {
   ReconstructionOptions options;
@@ -80,11 +58,11 @@ Result<ReconstructionOptions> options_from(const ReconstructArguments& arguments
   options.features.max_keypoints = arguments.max_features;
   options.features.oriented = !arguments.upright;
   options.features.upsample = !arguments.no_upsample;
-  options.num_threads = arguments.threads > 0
-                            ? arguments.threads
-                            : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  options.memory_limit_bytes = arguments.memory_limit_bytes;
-  options.seed = arguments.seed;
+  options.num_threads = threads_from(arguments.surface);
+  options.memory_limit_bytes = arguments.surface.memory_limit_bytes;
+  options.seed = arguments.surface.seed;
+  options.build =
+      build_options_from(arguments.surface, *last_stage_from_string(arguments.stop_after));
   options.software_version = TRIGMESH_VERSION;
   if (!arguments.camera_file.empty()) {
     TM_ASSIGN_OR_RETURN(const std::vector<CameraProfile> profiles,
@@ -92,6 +70,9 @@ Result<ReconstructionOptions> options_from(const ReconstructArguments& arguments
     for (const CameraProfile& profile : profiles) {
       options.cameras.push_back(profile.camera);
     }
+  }
+  if (!arguments.poses.empty()) {
+    TM_ASSIGN_OR_RETURN(options.poses, read_model(arguments.poses));
   }
   return options;
 }
@@ -117,14 +98,18 @@ void print_summary(const ReconstructionReport& report, const std::string& output
 
 Result<> run(const ReconstructArguments& arguments) {
   TM_ASSIGN_OR_RETURN(const ReconstructionOptions options, options_from(arguments));
-  TM_ASSIGN_OR_RETURN(const PhotoSet photos, open_photos(arguments));
+  TM_ASSIGN_OR_RETURN(
+      const PhotoSet photos,
+      open_photos(arguments.input,
+                  arguments.grouping == "folder" ? Subfolders::kInclude : Subfolders::kIgnore,
+                  arguments.no_masks ? MaskUse::kIgnore : MaskUse::kUse));
   const SteadyClock clock;
   const InterruptWatch interrupt;
   std::optional<ReconstructionSummary> summary;
   {
-    ProgressPrinter printer(
-        arguments.quiet ? ProgressPrinter::Style::kQuiet : ProgressPrinter::style_of_stderr(),
-        clock);
+    ProgressPrinter printer(arguments.surface.quiet ? ProgressPrinter::Style::kQuiet
+                                                    : ProgressPrinter::style_of_stderr(),
+                            clock);
     TM_ASSIGN_OR_RETURN(
         summary, reconstruct(photos, arguments.output, options, clock, printer, interrupt.token()));
   }
@@ -143,17 +128,19 @@ Result<> run(const ReconstructArguments& arguments) {
 
 void add_reconstruct_command(CLI::App& app, CommandContext& context) {
   CLI::App* command = app.add_subcommand(
-      "reconstruct", "Make camera poses and a coloured point cloud from photographs");
+      "reconstruct",
+      "Make camera poses, a coloured point cloud and a textured mesh from photographs");
   auto arguments = std::make_shared<ReconstructArguments>();
   command->add_option("INPUT", arguments->input, "Folder of photographs, list file or recording")
       ->required();
   command->add_option("-o,--output", arguments->output, "Folder for the result; made when missing")
       ->required();
-  command->add_option("--camera",
-                      arguments->camera_file,
-                      "Known intrinsics: a profile of trigmesh calibrate or a COLMAP cameras.txt; "
-                      "else the focal length in EXIF "
-                      "is a first guess, else it is solved");
+  CLI::Option* camera = command->add_option(
+      "--camera",
+      arguments->camera_file,
+      "Known intrinsics: a profile of trigmesh calibrate or a COLMAP cameras.txt; "
+      "else the focal length in EXIF "
+      "is a first guess, else it is solved");
   command
       ->add_option("--camera-groups",
                    arguments->grouping,
@@ -177,23 +164,19 @@ void add_reconstruct_command(CLI::App& app, CommandContext& context) {
       ->check(CLI::IsMember({"auto", "sequential", "retrieval", "exhaustive"}))
       ->capture_default_str();
   command
-      ->add_option("--threads",
-                   arguments->threads,
-                   "Threads that work; 0 = one a core. The result does not depend on it")
-      ->check(CLI::Range(0, 256))
-      ->capture_default_str();
-  command
-      ->add_option("--memory-limit",
-                   arguments->memory_limit_bytes,
-                   "Most memory to use, e.g. 500M or 2G; quality is lowered to keep it, and the "
-                   "report says how")
-      ->transform(CLI::AsSizeValue(true));
+      ->add_option(
+          "--poses",
+          arguments->poses,
+          "Known cameras and poses, a COLMAP model with the names of the photographs: only "
+          "points and surface are made")
+      ->excludes(camera);
+  command->add_flag("--no-masks",
+                    arguments->no_masks,
+                    "Do not use masks/NAME.png beside the photographs (white = leave out)");
   command->add_option("--stop-after", arguments->stop_after, "Last stage")
-      ->check(CLI::IsMember({"sparse"}))
+      ->check(CLI::IsMember({"sparse", "dense", "mesh", "texture"}))
       ->capture_default_str();
-  command->add_option("--seed", arguments->seed, "Start of all random sampling")
-      ->capture_default_str();
-  command->add_flag("--quiet", arguments->quiet, "No progress");
+  add_surface_options(*command, arguments->surface);
   command->footer(kFooter);
   command->callback([arguments, &context] { finish_command(context, run(*arguments)); });
 }

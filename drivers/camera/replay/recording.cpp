@@ -65,7 +65,7 @@ Result<FolderContents> list_folder(const fs::path& folder, const RecordingOption
     if (!format || !entry->is_regular_file(type_error) || !is_safe_frame_name(name)) {
       contents.ignored.push_back(name);
     } else {
-      contents.frames.push_back({name, entry->path(), std::nullopt, *format});
+      contents.frames.push_back({name, entry->path(), std::nullopt, *format, {}});
     }
     if (contents.frames.size() + contents.ignored.size() > options.max_frames) {
       return fail(ErrorCode::kLimitExceeded,
@@ -106,7 +106,7 @@ Result<FolderContents> order_by_time(FolderContents contents,
                   (images.parent_path() / "timestamps.csv").string(),
                   row.name);
     }
-    ordered.frames.push_back({row.name, images / row.name, row.timestamp, *format});
+    ordered.frames.push_back({row.name, images / row.name, row.timestamp, *format, {}});
     unlisted.erase(row.name);
   }
   std::stable_sort(ordered.frames.begin(),
@@ -148,12 +148,29 @@ Result<FolderContents> list_from_file(const fs::path& list, const RecordingOptio
   for (const std::string& path : paths) {
     const std::optional<FrameFormat> format = format_of(path);
     if (format) {
-      contents.frames.push_back({path, list.parent_path() / path, std::nullopt, *format});
+      contents.frames.push_back({path, list.parent_path() / path, std::nullopt, *format, {}});
     } else {
       contents.ignored.push_back(path);
     }
   }
   return contents;
+}
+
+/// masks/NAME.png for each frame that has one, NAME with or without the ending of the picture.
+void find_masks(const fs::path& masks, std::vector<RecordedFrame>& frames) {
+  std::error_code error;
+  if (!fs::is_directory(masks, error)) {
+    return;
+  }
+  for (RecordedFrame& frame : frames) {
+    for (const fs::path& candidate :
+         {masks / fs::path(frame.name).replace_extension(".png"), masks / (frame.name + ".png")}) {
+      if (fs::is_regular_file(candidate, error)) {
+        frame.mask_path = candidate;
+        break;
+      }
+    }
+  }
 }
 
 Result<RecordingKind> kind_of(const fs::path& input) {
@@ -226,6 +243,9 @@ Result<Recording> Recording::open(const fs::path& input, const RecordingOptions&
                 kWhatIsAccepted);
   }
   recording.frames_ = std::move(contents->frames);
+  if (recording.kind_ != RecordingKind::kListFile) {
+    find_masks(input / "masks", recording.frames_);
+  }
   recording.ignored_ = std::move(contents->ignored);
   return recording;
 }
@@ -239,6 +259,17 @@ Result<Frame> Recording::frame(std::size_t index) const {
     return fail(ErrorCode::kCorruptData, "{} is empty", entry.path.string());
   }
   return frame;
+}
+
+Result<std::optional<std::vector<std::uint8_t>>> Recording::mask(std::size_t index) const {
+  TM_CHECK(index < frames_.size());
+  const fs::path& path = frames_[index].mask_path;
+  if (path.empty()) {
+    return std::optional<std::vector<std::uint8_t>>();
+  }
+  TM_ASSIGN_OR_RETURN(std::vector<std::uint8_t> bytes,
+                      read_file_bytes(path, options_.max_frame_bytes));
+  return std::optional(std::move(bytes));
 }
 
 Result<std::optional<Frame>> ReplaySource::next() {

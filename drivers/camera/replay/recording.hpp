@@ -51,6 +51,7 @@ struct RecordedFrame {
   std::filesystem::path path;
   std::optional<std::chrono::nanoseconds> timestamp;
   FrameFormat format = FrameFormat::kJpeg;
+  std::filesystem::path mask_path;  ///< masks/NAME.png of a recording or photo folder; empty: none
 };
 
 /// The table of contents of a recording or folder of photographs. Opening reads names and
@@ -79,6 +80,11 @@ class Recording {
   /// Reads one picture. Precondition: index < size(). kNotFound, kIo, kLimitExceeded; kCorruptData
   /// when the file is empty.
   [[nodiscard]] Result<Frame> frame(std::size_t index) const;
+
+  /// Reads the mask of one picture, a PNG of its size in which white is to be left out; nothing
+  /// when it has none. NAME of masks/NAME.png is that of the picture with or without its ending.
+  /// Precondition: index < size(). kIo, kLimitExceeded.
+  [[nodiscard]] Result<std::optional<std::vector<std::uint8_t>>> mask(std::size_t index) const;
 
  private:
   Recording() = default;

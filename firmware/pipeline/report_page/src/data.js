@@ -43,9 +43,16 @@ function readSeenPoints(next) {
   return seen;
 }
 
+/** The GLB: { name, bytes, limitBytes, glb: ArrayBuffer, or null when it is too large for the page }; or null. */
+function readModelFile() {
+  const file = readJson('model-data');
+  return file && { name: file.name, bytes: file.bytes, limitBytes: file.limit_bytes, glb: file.glb === null ? null : bytesOf(file.glb).buffer };
+}
+
 /**
- * { report, components }: the report as in report.json, and per component
- * { points, pointsTotal, positions: Float32Array, colors: Uint8Array, poses: [{ image, camera, center, rotation, seen }] }.
+ * { report, components, modelFile, depthMaps }: the report as in report.json, and per component
+ * { points, pointsTotal, positions: Float32Array, colors: Uint8Array, poses: [{ image, camera, center, rotation, seen }] };
+ * the mesh's file or null; depth maps as report_html.cpp writes them.
  */
 export function readData() {
   const report = readJson('report-data');
@@ -66,5 +73,5 @@ export function readData() {
     start = end;
     return result;
   });
-  return { report, components };
+  return { report, components, modelFile: readModelFile(), depthMaps: readJson('depth-data') ?? [] };
 }

@@ -6,6 +6,7 @@ import { buildHistogram } from './histogram.js';
 import { buildImageTable } from './image_table.js';
 import { buildMatchMatrix } from './match_matrix.js';
 import { buildCameras, buildCards, buildHeader, buildNotes, buildSettings } from './summary.js';
+import { buildDepthMaps, buildSurface } from './surface.js';
 import { buildViewer } from './viewer/viewer.js';
 
 let problems = 0;
@@ -44,10 +45,10 @@ function redrawWhenLookChanges(redraw) {
 }
 
 function build() {
-  const { report, components } = readData();
+  const { report, components, modelFile, depthMaps } = readData();
   document.title = `${report.input || 'Reconstruction'} \u2013 report`;
   const tooltip = createTooltip();
-  const viewer = buildViewer(report, components, tooltip);
+  const viewer = buildViewer(report, components, modelFile, tooltip);
   const select = (image) => {
     if (viewer?.select(image)) viewer.element.scrollIntoView({ behavior: 'smooth', block: 'nearest' });
   };
@@ -58,6 +59,8 @@ function build() {
       buildNotes(report.notes),
       buildCards(report),
       viewer?.element,
+      buildSurface(report),
+      buildDepthMaps(report, depthMaps, select),
       buildPlots(report, tooltip),
       buildImageTable(report, select),
       matrix?.element,
@@ -81,6 +84,6 @@ try {
   document.getElementById('report').prepend(h('p', { class: 'note note-error' }, `The report cannot be drawn: ${error}`));
   throw error;
 } finally {
-  document.body.dataset.requests = String(performance.getEntriesByType('resource').length);
+  document.body.dataset.requests = String(performance.getEntriesByType('resource').filter((entry) => !/^(data|blob):/.test(entry.name)).length);
   document.body.dataset.ready = 'true';
 }

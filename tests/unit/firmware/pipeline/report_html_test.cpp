@@ -237,5 +237,72 @@ TEST(ReportGeometry, IsEmptyWithoutComponents) {
   EXPECT_EQ(json["positions"], "");
 }
 
+DepthPicture depth_picture_of(const std::string& image_name) {
+  return {.image_name = image_name,
+          .image_jpeg = {1, 2, 3},
+          .depth_jpeg = {4, 5},
+          .confidence_jpeg = {6},
+          .near_depth = 1.5,
+          .far_depth = 4.0,
+          .filled_ratio = 0.5};
+}
+
+TEST(ReportHtml, CarriesTheMeshInBase64) {
+  const std::vector<Scene> scenes = small_model();
+  ReportAttachments attachments;
+  const std::string glb("glTF\0\xFF<&", 8);
+  attachments.glb = glb;
+  const Json model = Json::parse(
+      data_block(render_report_html(report_of(scenes), scenes, attachments), "model-data"));
+  const std::vector<std::uint8_t> bytes = decode_base64(model["glb"].get<std::string>());
+  EXPECT_EQ(std::string(bytes.begin(), bytes.end()), glb);
+  EXPECT_EQ(model["name"], "textured.glb");
+  EXPECT_EQ(model["bytes"], 8);
+}
+
+TEST(ReportHtml, NamesAMeshThatIsTooLarge) {
+  const std::string at_limit(kReportPageGlbLimitBytes, 'x');
+  const std::string above(kReportPageGlbLimitBytes + 1, 'x');
+  ReportAttachments attachments;
+  attachments.glb = at_limit;
+  const std::string with = render_report_html({}, {}, attachments);
+  EXPECT_FALSE(Json::parse(data_block(with, "model-data"))["glb"].is_null());
+  attachments.glb = above;
+  const std::string without = render_report_html({}, {}, attachments);
+  EXPECT_TRUE(Json::parse(data_block(without, "model-data"))["glb"].is_null());
+  EXPECT_LT(without.size(), std::size_t{4} << 20);
+}
+
+TEST(ReportHtml, HasNoBlocksWithoutAttachments) {
+  const std::string html = render_report_html({}, {});
+  EXPECT_THAT(html, Not(HasSubstr("id=\"model-data\"")));
+  EXPECT_THAT(html, Not(HasSubstr("id=\"depth-data\"")));
+}
+
+TEST(ReportHtml, CarriesDepthPicturesOfKnownImages) {
+  const std::vector<Scene> scenes = small_model();
+  const std::vector<DepthPicture> pictures{depth_picture_of(scenes[0].views[2].name),
+                                           depth_picture_of("unknown.jpg")};
+  ReportAttachments attachments;
+  attachments.depth_pictures = pictures;
+  const Json list = Json::parse(
+      data_block(render_report_html(report_of(scenes), scenes, attachments), "depth-data"));
+  ASSERT_EQ(list.size(), 1U);
+  EXPECT_EQ(list[0]["image"], 2);
+  EXPECT_EQ(decode_base64(list[0]["picture"].get<std::string>()), pictures[0].image_jpeg);
+  EXPECT_EQ(list[0]["near"], 1.5);
+}
+
+TEST(ReportHtml, LimitsTheNumberOfDepthPictures) {
+  const std::vector<Scene> scenes = small_model();
+  const std::vector<DepthPicture> pictures(kReportDepthViewLimit + 5,
+                                           depth_picture_of(scenes[0].views[0].name));
+  ReportAttachments attachments;
+  attachments.depth_pictures = pictures;
+  const Json list = Json::parse(
+      data_block(render_report_html(report_of(scenes), scenes, attachments), "depth-data"));
+  EXPECT_EQ(list.size(), kReportDepthViewLimit);
+}
+
 }  // namespace
 }  // namespace trigmesh

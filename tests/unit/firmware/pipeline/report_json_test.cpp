@@ -92,6 +92,50 @@ TEST(ReportJson, IsTheSameForTheSameReport) {
   EXPECT_THAT(render_report_json(small_report()), EndsWith("}\n"));
 }
 
+TEST(ReportJson, HasNoMemberForStagesThatDidNotRun) {
+  const Json json = Json::parse(render_report_json(small_report()));
+  for (const char* section : {"dense", "surface", "texture"}) {
+    EXPECT_FALSE(json.contains(section)) << section;
+  }
+  EXPECT_TRUE(json["metres_per_unit"].is_null());
+}
+
+TEST(ReportJson, TellsOfDenseSurfaceAndTexture) {
+  ReconstructionReport report = small_report();
+  report.metres_per_unit = 0.25;
+  report.dense = DenseSection{.views = 7,
+                              .map_width_px = 640,
+                              .map_height_px = 480,
+                              .filled_ratio = 0.87654,
+                              .points = 12345,
+                              .mean_view_count = 4.5,
+                              .lowered = {"half the depth-map size, to keep 700 MB"}};
+  report.surface = SurfaceSection{.vertices = 100,
+                                  .faces = 196,
+                                  .components = 1,
+                                  .area = 12.3456789,
+                                  .seen_ratio = 0.98,
+                                  .holes_filled = 3,
+                                  .holes_open = 1,
+                                  .largest_holes = {{{1.0, -2.0, 1e-7}, 0.00123456789}}};
+  report.texture = TextureSection{.views_used = 6,
+                                  .charts = 20,
+                                  .pages = 2,
+                                  .page_size_px = 4096,
+                                  .textured_ratio = 0.95,
+                                  .held_out_views = 2,
+                                  .psnr_db = 24.567};
+  const Json json = Json::parse(render_report_json(report));
+  EXPECT_EQ(json["metres_per_unit"], 0.25);
+  EXPECT_EQ(json["dense"]["filled_ratio"], 0.877);
+  EXPECT_EQ(json["dense"]["lowered"][0], "half the depth-map size, to keep 700 MB");
+  EXPECT_EQ(json["surface"]["area"], 12.3457);
+  EXPECT_EQ(json["surface"]["largest_holes"][0]["center"][2].dump(), "1e-07");
+  EXPECT_EQ(json["surface"]["largest_holes"][0]["perimeter"], 0.00123457);
+  EXPECT_EQ(json["texture"]["psnr_db"], 24.57);
+  EXPECT_TRUE(json["texture"]["ssim"].is_null());
+}
+
 TEST(ReportJson, HoldsEmptyListsForAnEmptyReport) {
   const Json json = Json::parse(render_report_json(ReconstructionReport{}));
   for (const char* list : {"notes", "components", "cameras", "images", "pairs", "settings"}) {

@@ -185,6 +185,18 @@ TEST(ReportVerdict, IsCompleteWhenAllImagesAreInOneModel) {
   EXPECT_THAT(report.units_sentence, StartsWith("Up to scale"));
 }
 
+TEST(Report, CarriesSectionsAndScale) {
+  ReportInput input;
+  input.metres_per_unit = 0.5;
+  input.dense = DenseSection{.views = 3};
+  input.texture = TextureSection{.pages = 2};
+  const ReconstructionReport report = build_report(input);
+  EXPECT_EQ(report.units_sentence, "Metric: one model unit is 0.5 m.");
+  EXPECT_EQ(report.dense->views, 3U);
+  EXPECT_FALSE(report.surface.has_value());
+  EXPECT_EQ(report.texture->pages, 2U);
+}
+
 TEST(ReportVerdict, IsPartialWhenSomeImagesAreRefused) {
   const std::vector<Scene> scenes{three_cameras_one_point()};
   std::vector<ImageOutcome> images = outcomes_of(scenes[0], 0);

@@ -2,9 +2,11 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <opencv2/core.hpp>
 
 #include "firmware/pipeline/image_features.hpp"
 #include "firmware/pipeline/matching_stage.hpp"
+#include "firmware/pipeline/photo_set.hpp"
 #include "sfm/exchange/image_codec.hpp"
 
 namespace trigmesh {
@@ -45,6 +47,38 @@ TEST(StoredFeatures, ComeBackAsTheyWere) {
   EXPECT_EQ(after->camera_key, before.camera_key);
   EXPECT_EQ(after->features.kind, before.features.kind);
   EXPECT_EQ(after->colors, before.colors);
+}
+
+TEST(DropMaskedFeatures, KeepsWhatBelongsTogetherOfTheRest) {
+  ImageFeatures image = some_features();
+  cv::Mat mask(480, 640, CV_8UC1, cv::Scalar(255));
+  drop_masked_features(mask, image);
+  EXPECT_EQ(encode_image_features(image), encode_image_features(some_features()));
+  mask.at<std::uint8_t>(2, 1) = 0;  // the first keypoint
+  drop_masked_features(mask, image);
+  ASSERT_EQ(image.features.size(), 1U);
+  EXPECT_EQ(image.features.keypoints[0].x_px, 4.0F);
+  EXPECT_THAT(image.features.descriptors, testing::ElementsAre(3, 4));
+  EXPECT_EQ(image.colors, (std::vector<Rgb>{{40, 50, 60}}));
+}
+
+TEST(LoadMask, WhiteIsLeftOutAndTheSizeMustFit) {
+  cv::Mat picture(2, 3, CV_8UC1, cv::Scalar(0));
+  picture.at<std::uint8_t>(1, 2) = 255;
+  const std::vector<std::uint8_t> png = *encode_png(picture);
+  PhotoSet photos;
+  photos.names = {"a.jpg"};
+  EXPECT_TRUE(load_mask(photos, 0, 3, 2)->empty());
+  photos.read_mask = [&](std::size_t) -> Result<std::optional<std::vector<std::uint8_t>>> {
+    return std::optional(png);
+  };
+  const auto mask = load_mask(photos, 0, 3, 2);
+  ASSERT_TRUE(mask) << mask.error().message;
+  EXPECT_EQ(mask->at<std::uint8_t>(0, 0), 255);
+  EXPECT_EQ(mask->at<std::uint8_t>(1, 2), 0);
+  const auto other_size = load_mask(photos, 0, 4, 2);
+  ASSERT_FALSE(other_size);
+  EXPECT_EQ(other_size.error().code, ErrorCode::kCorruptData);
 }
 
 TEST(StoredFeatures, AreRefusedWhenCutOrFollowedByMore) {

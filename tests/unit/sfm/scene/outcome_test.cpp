@@ -20,7 +20,8 @@ constexpr std::array kAllReasons{RefusalReason::kNone,
                                  RefusalReason::kTooFewMapMatches,
                                  RefusalReason::kPoseRejected,
                                  RefusalReason::kPoseUnstable,
-                                 RefusalReason::kOtherComponent};
+                                 RefusalReason::kOtherComponent,
+                                 RefusalReason::kNoGivenPose};
 
 TEST(RefusalReason, HasAStableDistinctName) {
   std::set<std::string_view> names;

@@ -13,7 +13,7 @@ function quantiles(values) {
 }
 
 /** Sphere around the bulk of the points and all cameras; stray far points do not count. */
-function boundingSphere(positions, poses) {
+export function boundingSphere(positions, poses) {
   const low = new Vector3(Infinity, Infinity, Infinity);
   const high = new Vector3(-Infinity, -Infinity, -Infinity);
   if (positions.length > 0) {

@@ -40,15 +40,16 @@ function choice(label, options, changed) {
   return h('label', { class: 'control' }, h('span', null, label), select);
 }
 
-/** actions: { changed(), setUp(text), setComponent(index), reset() }. */
-export function buildToolbar(state, models, actions) {
+/** actions: { changed(), setUp(text), setComponent(index), reset() }; `hasMesh`: whether there is a mesh to switch. */
+export function buildToolbar(state, models, hasMesh, actions) {
+  const switches = [['Points', 'showPoints'], ['Cameras', 'showCameras'], ['Links', 'showLinks']];
+  if (hasMesh) switches.unshift(['Mesh', 'showMesh']);
+  const toggles = switches.map(([label, key]) => [key, toggle(label, key, state, actions.changed)]);
   const components = models.map((model, i) => [String(i), `${i === 0 ? 'main' : i + 1}: ${plural(model.poses.length, 'image')}`]);
   const element = h(
     'div',
     { class: 'toolbar', role: 'toolbar', 'aria-label': '3D view' },
-    toggle('Points', 'showPoints', state, actions.changed),
-    toggle('Cameras', 'showCameras', state, actions.changed),
-    toggle('Links', 'showLinks', state, actions.changed),
+    toggles.map(([, button]) => button),
     slider('Point size', 'pointSize', { min: 1, max: 8, step: 0.5 }, state, actions.changed),
     slider('Camera size', 'cameraSize', { min: 0.2, max: 4, step: 0.1 }, state, actions.changed),
     choice('Up', UP_CHOICES, actions.setUp),
@@ -58,6 +59,10 @@ export function buildToolbar(state, models, actions) {
   const componentSelect = models.length > 1 ? element.querySelectorAll('select')[1] : null;
   return {
     element,
+    /** Once the state has changed in another way than by the buttons. */
+    showState() {
+      for (const [key, button] of toggles) button.setAttribute('aria-pressed', String(state[key]));
+    },
     showComponent(index) {
       if (componentSelect) componentSelect.value = String(index);
     },

@@ -6,6 +6,7 @@ import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { h, section } from '../dom.js';
 import { count, plural } from '../format.js';
 import { CanvasPainter } from './canvas_painter.js';
+import { loadMesh } from './mesh.js';
 import { buildModel, samplePoints } from './model.js';
 import { buildCameraCard, buildToolbar } from './panel.js';
 import { WebglPainter, webglWorks } from './webgl_painter.js';
@@ -30,16 +31,49 @@ function readPalette() {
   return { background: rgb('--stage'), camera: rgb('--camera'), selected: rgb('--selected'), link: rgb('--camera') };
 }
 
+/** What becomes of the mesh: 'none', 'loading' (later 'shown' or 'failed'), 'too_large', 'no_webgl'. */
+function meshState(modelFile, useWebgl) {
+  if (!modelFile) return 'none';
+  if (modelFile.glb === null) return 'too_large';
+  return useWebgl ? 'loading' : 'no_webgl';
+}
+
+function megabytes(bytes) {
+  return `${(bytes / 2 ** 20).toFixed(1)} MB`;
+}
+
+function meshSentence(state, file, mesh) {
+  const elsewhere = file ? `open ${file.name} beside this page in a viewer of 3D models` : '';
+  switch (state) {
+    case 'loading':
+      return 'The mesh is being unpacked.';
+    case 'shown':
+      return `Mesh of ${plural(mesh.faces, 'face')}${mesh.pages > 0 ? ` with ${plural(mesh.pages, 'page')} of texture` : ''}, without shading: its light is that of the photographs.`;
+    case 'too_large':
+      return `The mesh of ${megabytes(file.bytes)} is too large for this page (${megabytes(file.limitBytes)}): ${elsewhere}.`;
+    case 'no_webgl':
+      return `To see the mesh, ${elsewhere}.`;
+    case 'failed':
+      return `The mesh could not be shown here: ${elsewhere}.`;
+    default:
+      return '';
+  }
+}
+
 class Viewer {
-  constructor(report, models, tooltip) {
+  constructor(report, models, modelFile, tooltip) {
     this.report = report;
     this.models = models;
+    this.modelFile = modelFile;
     this.tooltip = tooltip;
-    this.component = 0;
     this.model = models[0];
+    this.useWebgl = !location.hash.includes('2d') && webglWorks();
+    this.meshState = meshState(modelFile, this.useWebgl);
+    this.mesh = null; // until it is loaded
+    const hasMesh = this.meshState === 'loading';
     this.up = 'cameras';
     this.rotation = new Quaternion();
-    this.state = { showPoints: true, showCameras: true, showLinks: false, pointSize: 2, cameraSize: 1, selected: -1 };
+    this.state = { component: 0, showMesh: hasMesh, showPoints: !hasMesh, showCameras: !hasMesh, showLinks: false, pointSize: 2, cameraSize: 1, selected: -1 };
     this.camera = new PerspectiveCamera(FIELD_OF_VIEW_DEG, 1, 0.01, 1000);
     this.buildElements();
   }
@@ -50,7 +84,7 @@ class Viewer {
     this.frame = h('div', { class: 'stage-frame' }, this.canvas);
     this.card = h('aside', { class: 'camera-card', 'aria-live': 'polite', 'aria-label': 'Selected camera', hidden: true });
     this.message = h('p', { class: 'hint' });
-    this.toolbar = buildToolbar(this.state, this.models, {
+    this.toolbar = buildToolbar(this.state, this.models, this.meshState === 'loading', {
       changed: () => this.stateChanged(),
       setUp: (up) => this.setUp(up),
       setComponent: (index) => this.setComponent(index),
@@ -61,9 +95,8 @@ class Viewer {
 
   /** Once the elements are in the document. */
   start() {
-    const useWebgl = !location.hash.includes('2d') && webglWorks();
-    this.painter = useWebgl ? new WebglPainter(this.canvas) : new CanvasPainter(this.canvas);
-    document.body.dataset.renderer = useWebgl ? 'webgl' : '2d';
+    this.painter = this.useWebgl ? new WebglPainter(this.canvas) : new CanvasPainter(this.canvas);
+    document.body.dataset.renderer = this.useWebgl ? 'webgl' : '2d';
     this.controls = new OrbitControls(this.camera, this.canvas);
     this.controls.enableDamping = true;
     this.controls.dampingFactor = 0.12;
@@ -74,7 +107,38 @@ class Viewer {
     this.resize();
     this.setComponent(0);
     this.renderNow();
+    this.tellCheck();
+    if (this.meshState === 'loading') this.startMesh();
+  }
+
+  /** For tests. */
+  tellCheck() {
+    if (this.modelFile) document.body.dataset.mesh = this.meshState;
     if (location.hash.includes('check')) document.body.dataset.drawn = String(this.countDrawnPixels());
+  }
+
+  async startMesh() {
+    try {
+      this.mesh = await loadMesh(this.modelFile.glb);
+      this.meshState = 'shown';
+      this.painter.setMesh(this.mesh.object);
+      this.modelFile.glb = null; // its memory is no longer needed
+    } catch (error) {
+      console.warn(error);
+      this.meshState = 'failed';
+      Object.assign(this.state, { showMesh: false, showPoints: true, showCameras: true });
+      this.toolbar.showState();
+    }
+    this.tellCounts();
+    this.stateChanged();
+    this.resetView();
+    this.renderNow();
+    this.tellCheck();
+  }
+
+  /** What the view is about: the mesh while it is shown, else the points. */
+  subject() {
+    return this.state.showMesh && this.mesh && this.state.component === 0 ? this.mesh : this.model;
   }
 
   listen() {
@@ -121,8 +185,12 @@ class Viewer {
   }
 
   setComponent(index) {
-    this.component = index;
+    this.state.component = index;
     this.model = this.models[index];
+    if (index > 0 && !this.state.showPoints) {
+      this.state.showPoints = true; // the mesh is of the main model
+      this.toolbar.showState();
+    }
     this.painter.setModel(this.model);
     this.toolbar.showComponent(index);
     this.tellCounts();
@@ -134,6 +202,7 @@ class Viewer {
     const shown = this.model.positions.length / 3;
     const { images_refused: refused } = this.report.totals;
     this.message.textContent = [
+      meshSentence(this.meshState, this.modelFile, this.mesh),
       `${plural(this.model.poses.length, 'camera')}, ${plural(shown, 'point')}${shown < this.model.pointsTotal ? ` of ${count(this.model.pointsTotal)} (thinned evenly for this page)` : ''}.`,
       refused > 0 ? `${plural(refused, 'refused image')} without a place here: see the table.` : '',
       document.body.dataset.renderer === '2d' ? 'This browser offers no WebGL, so a simpler drawing is shown.' : '',
@@ -160,7 +229,7 @@ class Viewer {
     forward.y = 0;
     const direction = forward.length() > 0.25 ? forward.normalize().negate().applyAxisAngle(Y_UP, 0.35) : new Vector3(0.6, 0, 0.8);
     direction.y = 0.42;
-    const target = this.toStage(this.model.center);
+    const target = this.toStage(this.subject().center);
     this.setLens(FIELD_OF_VIEW_DEG);
     this.controls.target.copy(target);
     this.camera.position.copy(target).addScaledVector(direction.normalize(), this.fittingDistance(target, direction));
@@ -178,8 +247,8 @@ class Viewer {
       const offset = this.toStage(world).sub(target);
       return offset.dot(direction) + Math.max(Math.abs(offset.dot(right)) / tanX, Math.abs(offset.dot(upward)) / tanY);
     };
-    const points = samplePoints(this.model, FIT_SAMPLES).map(needed).sort((a, b) => a - b);
-    const cameras = this.model.poses.map((pose) => needed(pose.center));
+    const points = samplePoints(this.subject(), FIT_SAMPLES).map(needed).sort((a, b) => a - b);
+    const cameras = this.state.showCameras ? this.model.poses.map((pose) => needed(pose.center)) : [];
     return Math.max(points[Math.floor(FIT_QUANTILE * points.length)] ?? 0, ...cameras, 0.1 * this.model.radius);
   }
 
@@ -226,7 +295,11 @@ class Viewer {
     for (let component = 0; component < this.models.length; ++component) {
       const pose = this.models[component].poses.findIndex((candidate) => candidate.image === image);
       if (pose < 0) continue;
-      if (component !== this.component) this.setComponent(component);
+      if (component !== this.state.component) this.setComponent(component);
+      if (!this.state.showCameras) {
+        this.state.showCameras = true;
+        this.toolbar.showState();
+      }
       this.choosePose(pose);
       return true;
     }
@@ -326,9 +399,9 @@ class Viewer {
 }
 
 /** { element, start(), select(image) }. */
-export function buildViewer(report, components, tooltip) {
+export function buildViewer(report, components, modelFile, tooltip) {
   const models = components.filter((component) => component.poses.length > 0).map((component) => buildModel(component, report));
-  if (models.length > 0) return new Viewer(report, models, tooltip);
+  if (models.length > 0) return new Viewer(report, models, modelFile, tooltip);
   const element = section('view', 'Model', h('p', { class: 'empty' }, 'There is no model to show: no image could be registered. The table below tells why, image by image.'));
   document.body.dataset.renderer = 'none';
   return { element, start() {}, select: () => false };

@@ -83,10 +83,17 @@ export class WebglPainter {
     const seen = new Uint8Array(model.positions.length / 3);
     this.points = new Points(geometryOf({ position: [model.positions, 3], rgb: [model.colors, 3, true], seen: [seen, 1] }), this.pointMaterial);
     this.lines = new LineSegments(new BufferGeometry(), this.lineMaterial);
+    if (this.mesh) this.root.add(this.mesh);
     for (const object of [this.points, this.lines]) {
       object.frustumCulled = false;
       this.root.add(object);
     }
+  }
+
+  /** An object in the world of the model, drawn while state.showMesh is set and its component is shown. */
+  setMesh(mesh) {
+    this.mesh = mesh;
+    this.root.add(mesh);
   }
 
   setState(state, palette) {
@@ -96,6 +103,7 @@ export class WebglPainter {
     background.value.fromArray(palette.background);
     highlight.value.fromArray(palette.selected);
     this.points.visible = state.showPoints;
+    if (this.mesh) this.mesh.visible = state.showMesh && state.component === 0;
     this.points.geometry.setAttribute('seen', new BufferAttribute(seenMask(this.model, state), 1));
     const { positions, colors } = buildLines(this.model, state, palette);
     this.lines.geometry.dispose();

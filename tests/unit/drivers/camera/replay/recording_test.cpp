@@ -49,6 +49,23 @@ class RecordingTest : public ::testing::Test {
   fs::path root_;
 };
 
+TEST_F(RecordingTest, FindsMasksByTheNameWithAndWithoutItsEnding) {
+  for (const char* name : {"images/a.jpg", "images/b.jpg", "images/c.jpg"}) {
+    write(name);
+  }
+  write("masks/a.png", "mask of a");
+  write("masks/c.jpg.png", "mask of c");
+  const auto recording = Recording::open(root_);
+  ASSERT_TRUE(recording) << recording.error().message;
+  const auto text_of_mask = [&](std::size_t i) {
+    const auto mask = recording->mask(i);
+    return mask && *mask ? std::string((*mask)->begin(), (*mask)->end()) : std::string("none");
+  };
+  EXPECT_EQ(text_of_mask(0), "mask of a");
+  EXPECT_EQ(text_of_mask(1), "none");
+  EXPECT_EQ(text_of_mask(2), "mask of c");
+}
+
 TEST_F(RecordingTest, ListsPhotographsInNaturalOrderAndCountsTheRest) {
   for (const char* name : {"IMG_10.JPG", "IMG_9.jpeg", "IMG_11.png", "notes.txt", ".hidden.jpg"}) {
     write(name);

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <opencv2/core/mat.hpp>
+
+#include "firmware/base/result.hpp"
+
+namespace trigmesh {
+
+/// The photographs of one reconstruction. Whatever they come from (folder, list, recording) looks
+/// like this here.
+struct PhotoSet {
+  std::vector<std::string> names;  ///< unique, in input order
+  bool ordered = false;            ///< neighbours in the list are neighbours in time
+  std::string description;         ///< for the report, e.g. "photo folder, 25 photographs"
+  /// The encoded bytes (JPEG or PNG) of a photograph. Thread-safe.
+  std::function<Result<std::vector<std::uint8_t>>(std::size_t)> read;
+  /// The encoded mask of a photograph, white = leave out; nothing when it has none. Thread-safe;
+  /// may be empty: no photograph has a mask.
+  std::function<Result<std::optional<std::vector<std::uint8_t>>>(std::size_t)> read_mask;
+};
+
+/// The mask of a photograph in our convention: CV_8UC1 of the photograph's size, 0 = leave out, 255
+/// = use; an empty Mat when it has none. kCorruptData (not a picture, or of another size), kIo.
+[[nodiscard]] Result<cv::Mat> load_mask(const PhotoSet& photos,
+                                        std::size_t photo,
+                                        int width_px,
+                                        int height_px);
+
+}  // namespace trigmesh

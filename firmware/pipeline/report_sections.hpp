@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace trigmesh {
+
+// What the stages after mapping came to, for the report. Plain data, filled by the pipeline; the
+// sections that are missing are not shown. Lengths are in scene units, areas in their squares.
+
+/// Depth maps and the cloud that was made of them.
+struct DenseSection {
+  std::size_t views = 0;  ///< with a depth map
+  int map_width_px = 0;   ///< of the largest map
+  int map_height_px = 0;
+  double filled_ratio = 0.0;   ///< pixels with a depth among all, mean over the maps, [0, 1]
+  std::size_t points = 0;      ///< of dense.ply
+  double mean_view_count = 0;  ///< views that agree on a point
+  std::vector<std::string> lowered{};  ///< quality steps taken to keep a limit, one sentence each
+};
+
+/// A border of the surface that was left open.
+struct OpenHole {
+  Eigen::Vector3d center_in_world = Eigen::Vector3d::Zero();
+  double perimeter = 0.0;
+};
+
+/// The triangle mesh.
+struct SurfaceSection {
+  std::size_t vertices = 0;
+  std::size_t faces = 0;
+  std::size_t components = 0;          ///< pieces that hang together
+  double area = 0.0;                   ///< of all faces
+  std::optional<double> seen_ratio{};  ///< area that at least two views see, of all, [0, 1]
+  std::size_t holes_filled = 0;
+  std::size_t holes_open = 0;             ///< outer borders of an open surface count as one
+  std::vector<OpenHole> largest_holes{};  ///< the largest first; as many as are worth telling
+  std::vector<std::string> lowered{};
+};
+
+/// The pictures on the mesh.
+struct TextureSection {
+  std::size_t views_used = 0;  ///< views that gave a face its picture
+  std::size_t charts = 0;
+  std::size_t pages = 0;
+  int page_size_px = 0;
+  double textured_ratio = 0.0;      ///< area with a picture, of all, [0, 1]
+  std::size_t held_out_views = 0;   ///< left out of texturing, compared with renderings
+  std::optional<double> psnr_db{};  ///< over covered pixels of the held-out views
+  std::optional<double> ssim{};     ///< the same
+  std::vector<std::string> lowered{};
+};
+
+}  // namespace trigmesh

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <chrono>
+#include <vector>
+
+#include "firmware/base/clock.hpp"
+#include "firmware/pipeline/progress.hpp"
+
+namespace trigmesh {
+
+/// Time spent in each stage, for timings.json; never part of the model.
+struct StageTime {
+  Stage stage = Stage::kExtract;
+  std::chrono::nanoseconds duration{};
+};
+
+/// Measures the stages one after the other. `clock` outlives it.
+class Stopwatch {
+ public:
+  explicit Stopwatch(const Clock& clock) : clock_(&clock), last_(clock.now()) {}
+
+  /// The time since the stage before ended belongs to `stage`.
+  void finish(Stage stage) {
+    const auto now = clock_->now();
+    times_.push_back({stage, now - last_});
+    last_ = now;
+  }
+
+  [[nodiscard]] std::vector<StageTime> times() const { return times_; }
+
+ private:
+  const Clock* clock_;
+  std::chrono::nanoseconds last_;
+  std::vector<StageTime> times_;
+};
+
+}  // namespace trigmesh

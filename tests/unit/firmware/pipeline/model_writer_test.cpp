@@ -1,0 +1,58 @@
+#include "firmware/pipeline/model_writer.hpp"
+
+#include <cstdlib>
+#include <fstream>
+#include <string>
+#include <system_error>
+
+#include <gtest/gtest.h>
+
+namespace trigmesh {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string contents(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+}
+
+class ExtendModel : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (fs::temp_directory_path() / "trigmesh_writer_XXXXXX").string();
+    ASSERT_NE(mkdtemp(name.data()), nullptr);
+    output_ = name;
+  }
+
+  void TearDown() override {
+    std::error_code ignored;
+    fs::remove_all(output_, ignored);
+  }
+
+  fs::path output_;
+};
+
+TEST_F(ExtendModel, KeepsWhatIsThereAndAddsOrReplaces) {
+  const ReconstructionReport report = build_report({});
+  ASSERT_TRUE(write_model(output_, std::vector<Scene>(1), report));
+  const std::string images = contents(output_ / "model/sparse/images.txt");
+  const std::vector<NamedFile> first{{"dense.ply", "points"}, {"mesh.ply", "old"}};
+  ASSERT_TRUE(extend_model(output_, first, {}, report));
+  const std::vector<NamedFile> second{{"mesh.ply", "new"}};
+  ASSERT_TRUE(extend_model(output_, second, {}, report));
+  EXPECT_EQ(contents(output_ / "model/sparse/images.txt"), images);
+  EXPECT_EQ(contents(output_ / "model/dense.ply"), "points");
+  EXPECT_EQ(contents(output_ / "model/mesh.ply"), "new");
+  EXPECT_FALSE(fs::exists(output_ / ".model.part"));
+}
+
+TEST_F(ExtendModel, NeedsAModel) {
+  const auto result = extend_model(output_, {}, {}, build_report({}));
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().code, ErrorCode::kIo);
+  EXPECT_FALSE(fs::exists(output_ / ".model.part"));
+}
+
+}  // namespace
+}  // namespace trigmesh

@@ -1,0 +1,43 @@
+#include "tools/trigmesh/photo_input.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "firmware/base/check.hpp"
+
+namespace trigmesh {
+
+Result<PhotoSet> open_photos(const std::string& input, Subfolders subfolders, MaskUse masks) {
+  RecordingOptions options;
+  options.subfolders = subfolders;
+  TM_ASSIGN_OR_RETURN(const Recording recording, Recording::open(input, options));
+  PhotoSet photos;
+  for (const RecordedFrame& frame : recording.frames()) {
+    photos.names.push_back(frame.name);
+  }
+  photos.ordered = recording.kind() == RecordingKind::kRecording &&
+                   recording.frames().front().timestamp.has_value();
+  const auto masked = std::count_if(
+      recording.frames().begin(), recording.frames().end(), [](const RecordedFrame& frame) {
+        return !frame.mask_path.empty();
+      });
+  const std::filesystem::path path = std::filesystem::path(input).lexically_normal();
+  const std::filesystem::path name =
+      path.has_filename() ? path.filename() : path.parent_path().filename();
+  photos.description = fmt::format(
+      "{}: {}, {} photographs", name.string(), to_string(recording.kind()), recording.size());
+  photos.read = [recording](std::size_t i) -> Result<std::vector<std::uint8_t>> {
+    TM_ASSIGN_OR_RETURN(Frame frame, recording.frame(i));
+    return std::move(frame.bytes);
+  };
+  if (masks == MaskUse::kUse && masked > 0) {
+    photos.description += fmt::format(", {} with a mask", masked);
+    photos.read_mask = [recording](std::size_t i) { return recording.mask(i); };
+  }
+  return photos;
+}
+
+}  // namespace trigmesh
