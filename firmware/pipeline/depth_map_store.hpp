@@ -25,9 +25,6 @@ class DepthMapStore final : public DepthMapSource {
   DepthMapStore(const CheckpointFolder& folder, std::string round, std::vector<std::uint64_t> keys)
       : folder_(&folder), round_(std::move(round)), keys_(std::move(keys)) {}
 
-  DepthMapStore(DepthMapStore&& other) noexcept
-      : folder_(other.folder_), round_(std::move(other.round_)), keys_(std::move(other.keys_)) {}
-
   /// kIo, kNoSpace.
   [[nodiscard]] Result<> save(std::size_t view, const DepthMap& map) const;
 

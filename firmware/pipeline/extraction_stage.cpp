@@ -31,16 +31,12 @@ class PhotoWorker {
     if (!file) {
       return ExtractedImage{std::nullopt, file.error()};
     }
-    std::uint64_t key = content_hash(*file, settings_);
-    std::optional<std::vector<std::uint8_t>> mask;
-    if (photos_.read_mask) {
-      auto read = photos_.read_mask(i);
-      if (!read) {
-        return ExtractedImage{std::nullopt, read.error()};
-      }
-      mask = std::move(*read);
-      key = mask ? content_hash(*mask, key) : key;
+    const auto mask = read_mask(photos_, i);
+    if (!mask) {
+      return ExtractedImage{std::nullopt, mask.error()};
     }
+    const std::uint64_t of_file = content_hash(*file, settings_);
+    const std::uint64_t key = *mask ? content_hash(**mask, of_file) : of_file;
     const std::string checkpoint = fmt::format("features-{:06}", i);
     if (auto stored = from_checkpoint(checkpoint, key)) {
       return ExtractedImage{std::move(stored), {}};
@@ -49,8 +45,9 @@ class PhotoWorker {
     if (!extracted) {
       return ExtractedImage{std::nullopt, extracted.error()};
     }
-    if (mask) {
-      const auto usable = load_mask(photos_, i, extracted->width_px, extracted->height_px);
+    if (*mask) {
+      const auto usable =
+          decode_mask(**mask, photos_.names[i], extracted->width_px, extracted->height_px);
       if (!usable) {
         return ExtractedImage{std::nullopt, usable.error()};
       }

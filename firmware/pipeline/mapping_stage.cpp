@@ -39,8 +39,8 @@ RefusalReason reason_of(ErrorCode code) {
   }
 }
 
-/// What was wrong with photographs that could not be read.
-void tell_unreadable(const std::vector<ExtractedImage>& images, MappedPhotos& result) {
+/// Colours for the points, and for photographs that could not be read the reason.
+void complete(const std::vector<ExtractedImage>& images, MappedPhotos& result) {
   for (Scene& scene : result.components) {
     color_landmarks(scene, images);
   }
@@ -129,7 +129,7 @@ Result<MappedPhotos> map_known_poses(const PhotoSet& photos,
     result.outcomes.push_back(outcome_of(scene, view, posed[i].image.keypoints.size()));
   }
   result.components.push_back(std::move(scene));
-  tell_unreadable(images, result);
+  complete(images, result);
   return result;
 }
 
@@ -188,7 +188,7 @@ Result<MappedPhotos> map_photos(const PhotoSet& photos,
   }
   mapper.finish();
   MappedPhotos result{mapper.components(), mapper.outcomes()};
-  tell_unreadable(images, result);
+  complete(images, result);
   return result;
 }
 

@@ -55,12 +55,9 @@ Result<ViewImage> PhotoImages::load(std::size_t view) const {
 Result<std::uint64_t> PhotoImages::content(std::size_t view) const {
   const Item& item = items_[view];
   TM_ASSIGN_OR_RETURN(const auto bytes, photos_->read(item.photo));
-  std::uint64_t hash = content_hash(bytes);
-  if (photos_->read_mask) {
-    TM_ASSIGN_OR_RETURN(const auto mask, photos_->read_mask(item.photo));
-    hash = mask ? content_hash(*mask, hash) : hash;
-  }
-  return hash;
+  TM_ASSIGN_OR_RETURN(const auto mask, read_mask(*photos_, item.photo));
+  const std::uint64_t hash = content_hash(bytes);
+  return mask ? content_hash(*mask, hash) : hash;
 }
 
 }  // namespace trigmesh

@@ -20,9 +20,6 @@ class PhotoImages final : public ViewImageSource {
                                                   const Scene& scene,
                                                   const std::vector<DenseView>& views);
 
-  PhotoImages(PhotoImages&& other) noexcept
-      : photos_(other.photos_), items_(std::move(other.items_)) {}
-
   /// Also kInvalidArgument when the photograph has another size than its camera.
   [[nodiscard]] Result<ViewImage> load(std::size_t view) const override;
 

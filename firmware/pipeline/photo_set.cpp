@@ -14,26 +14,38 @@ constexpr double kLeaveOutFrom = 128.0;
 
 }  // namespace
 
-Result<cv::Mat> load_mask(const PhotoSet& photos, std::size_t photo, int width_px, int height_px) {
+Result<std::optional<std::vector<std::uint8_t>>> read_mask(const PhotoSet& photos,
+                                                           std::size_t photo) {
   if (!photos.read_mask) {
-    return cv::Mat();
+    return std::optional<std::vector<std::uint8_t>>();
   }
-  TM_ASSIGN_OR_RETURN(const auto bytes, photos.read_mask(photo));
-  if (!bytes) {
-    return cv::Mat();
-  }
+  return photos.read_mask(photo);
+}
+
+Result<cv::Mat> decode_mask(std::span<const std::uint8_t> mask,
+                            const std::string& name,
+                            int width_px,
+                            int height_px) {
   TM_ASSIGN_OR_RETURN(const DecodedImage decoded,
-                      decode_image(*bytes, {.channels = ImageChannels::kGrey}));
+                      decode_image(mask, {.channels = ImageChannels::kGrey}));
   if (decoded.grey.cols != width_px || decoded.grey.rows != height_px) {
     return fail(ErrorCode::kCorruptData,
                 "the mask of {} has {}x{} pixels, the photograph {}x{}",
-                photos.names[photo],
+                name,
                 decoded.grey.cols,
                 decoded.grey.rows,
                 width_px,
                 height_px);
   }
   return cv::Mat(decoded.grey < kLeaveOutFrom);
+}
+
+Result<cv::Mat> load_mask(const PhotoSet& photos, std::size_t photo, int width_px, int height_px) {
+  TM_ASSIGN_OR_RETURN(const auto mask, read_mask(photos, photo));
+  if (!mask) {
+    return cv::Mat();
+  }
+  return decode_mask(*mask, photos.names[photo], width_px, height_px);
 }
 
 }  // namespace trigmesh

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -26,8 +27,18 @@ struct PhotoSet {
   std::function<Result<std::optional<std::vector<std::uint8_t>>>(std::size_t)> read_mask;
 };
 
-/// The mask of a photograph in our convention: CV_8UC1 of the photograph's size, 0 = leave out, 255
-/// = use; an empty Mat when it has none. kCorruptData (not a picture, or of another size), kIo.
+/// The encoded mask of a photograph; nothing when it has none.
+[[nodiscard]] Result<std::optional<std::vector<std::uint8_t>>> read_mask(const PhotoSet& photos,
+                                                                         std::size_t photo);
+
+/// A mask in our convention: CV_8UC1 of the photograph's size, 0 = leave out, 255 = use. `name`: of
+/// the photograph, for the message. kCorruptData: not a picture, or of another size.
+[[nodiscard]] Result<cv::Mat> decode_mask(std::span<const std::uint8_t> mask,
+                                          const std::string& name,
+                                          int width_px,
+                                          int height_px);
+
+/// Both: the mask of a photograph, an empty Mat when it has none. kCorruptData, kIo.
 [[nodiscard]] Result<cv::Mat> load_mask(const PhotoSet& photos,
                                         std::size_t photo,
                                         int width_px,

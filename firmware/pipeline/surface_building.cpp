@@ -40,6 +40,12 @@ struct Work {
   std::string glb{};                     ///< likewise
 };
 
+void warn(ReconstructionReport& report, const std::vector<std::string>& sentences) {
+  for (const std::string& sentence : sentences) {
+    report.notes.push_back({NoteSeverity::kWarning, sentence});
+  }
+}
+
 Result<> check_not_stopped(const StageContext& context, const char* what) {
   if (context.stop.stop_requested()) {
     return fail(ErrorCode::kCancelled, "stopped before {}; finished stages are kept", what);
@@ -56,22 +62,28 @@ Result<> publish(const Work& work, const std::vector<NamedFile>& files) {
       {.glb = work.glb, .glb_name = "textured.glb", .depth_pictures = work.pictures});
 }
 
+/// A cloud and the file that holds it.
+struct WrittenCloud {
+  DenseCloud points;
+  std::string ply;
+};
+
 /// The cloud that was stored under the key of its maps, or the one that is made now and stored.
-Result<DenseCloud> stored_or_fused_cloud(const Work& work,
-                                         const DenseInput& input,
-                                         const DepthMaps& depth) {
+Result<WrittenCloud> stored_or_fused_cloud(const Work& work,
+                                           const DenseInput& input,
+                                           const DepthMaps& depth) {
   const CheckpointFolder& checkpoints = work.context.checkpoints;
   if (const auto stored = checkpoints.load("dense", depth.key)) {
-    if (auto cloud =
-            read_dense_ply({reinterpret_cast<const char*>(stored->data()), stored->size()})) {
-      return std::move(*cloud);
+    std::string ply(stored->begin(), stored->end());
+    if (auto points = read_dense_ply(ply)) {
+      return WrittenCloud{std::move(*points), std::move(ply)};
     }
   }
-  TM_ASSIGN_OR_RETURN(DenseCloud cloud, fuse_maps(input, depth, work.context));
-  const std::string ply = write_dense_ply(cloud);
+  TM_ASSIGN_OR_RETURN(DenseCloud points, fuse_maps(input, depth, work.context));
+  std::string ply = write_dense_ply(points);
   TM_RETURN_IF_ERROR(checkpoints.save(
       "dense", depth.key, {reinterpret_cast<const std::uint8_t*>(ply.data()), ply.size()}));
-  return cloud;
+  return WrittenCloud{std::move(points), std::move(ply)};
 }
 
 Result<> picture_depth(Work& work, const DepthMaps& depth) {
@@ -115,11 +127,11 @@ Result<DenseSection> sum_up(const Work& work, const DepthMaps& depth, const Dens
 
 Result<> densify(Work& work, const DenseInput& input, const DepthMaps& depth) {
   TM_RETURN_IF_ERROR(check_not_stopped(work.context, "the dense cloud"));
-  TM_ASSIGN_OR_RETURN(const DenseCloud cloud, stored_or_fused_cloud(work, input, depth));
-  TM_ASSIGN_OR_RETURN(work.report.dense, sum_up(work, depth, cloud));
+  TM_ASSIGN_OR_RETURN(WrittenCloud cloud, stored_or_fused_cloud(work, input, depth));
+  TM_ASSIGN_OR_RETURN(work.report.dense, sum_up(work, depth, cloud.points));
   TM_RETURN_IF_ERROR(picture_depth(work, depth));
   work.stopwatch.finish(Stage::kFuse);
-  return publish(work, {{"dense.ply", write_dense_ply(cloud)}});
+  return publish(work, {{"dense.ply", std::move(cloud.ply)}});
 }
 
 SurfaceSection sum_up(const SurfaceResult& made) {
@@ -148,9 +160,7 @@ SurfaceSection sum_up(const SurfaceResult& made) {
 
 Result<TriangleMesh> add_mesh(Work& work, SurfaceResult made) {
   work.report.surface = sum_up(made);
-  for (const std::string& sentence : work.report.surface->lowered) {
-    work.report.notes.push_back({NoteSeverity::kWarning, sentence});
-  }
+  warn(work.report, work.report.surface->lowered);
   work.stopwatch.finish(Stage::kSurface);
   TM_RETURN_IF_ERROR(publish(work, {{"mesh.ply", write_mesh_ply(made.mesh)}}));
   return std::move(made.mesh);
@@ -205,9 +215,7 @@ Result<> add_texture(Work& work, const TriangleMesh& mesh) {
       const TextureResult made,
       texture_surface(mesh, work.views, work.images, work.plan.texture, work.context.executor));
   work.report.texture = sum_up(made.report);
-  for (const std::string& sentence : made.report.lowered_quality) {
-    work.report.notes.push_back({NoteSeverity::kWarning, sentence});
-  }
+  warn(work.report, made.report.lowered_quality);
   TM_ASSIGN_OR_RETURN(std::vector<NamedFile> files, write_obj(made.textured));
   GlbOptions glb;
   glb.generator = fmt::format("trigmesh {}", work.input.options.software_version);
@@ -233,9 +241,7 @@ Result<> build_surface(const BuildInput& input,
   TM_ASSIGN_OR_RETURN(PhotoImages images, PhotoImages::create(input.photos, scene, views));
   TM_ASSIGN_OR_RETURN(SurfacePlan plan,
                       plan_surface(views, options, input.options.memory_limit_bytes));
-  for (const std::string& sentence : plan.lowered) {
-    report.notes.push_back({NoteSeverity::kWarning, sentence});
-  }
+  warn(report, plan.lowered);
   Work work{input,
             context,
             stopwatch,

@@ -35,13 +35,15 @@ class ViewImageSource {
   ViewImageSource() = default;
   ViewImageSource(const ViewImageSource&) = delete;
   ViewImageSource& operator=(const ViewImageSource&) = delete;
-  ViewImageSource(ViewImageSource&&) = delete;
   ViewImageSource& operator=(ViewImageSource&&) = delete;
   virtual ~ViewImageSource() = default;
 
   /// The picture of view `view`, undistorted, at full size. The same call gives the same pixels.
   /// Thread-safe. kIo, kCorruptData.
   [[nodiscard]] virtual Result<ViewImage> load(std::size_t view) const = 0;
+
+ protected:
+  ViewImageSource(ViewImageSource&&) = default;  ///< for sources that are made by a function
 };
 
 }  // namespace trigmesh

@@ -24,12 +24,14 @@ class DepthMapSource {
   DepthMapSource() = default;
   DepthMapSource(const DepthMapSource&) = delete;
   DepthMapSource& operator=(const DepthMapSource&) = delete;
-  DepthMapSource(DepthMapSource&&) = delete;
   DepthMapSource& operator=(DepthMapSource&&) = delete;
   virtual ~DepthMapSource() = default;
 
   /// The map of view `view`; empty mats when it has none. Thread-safe. kIo, kCorruptData.
   [[nodiscard]] virtual Result<DepthMap> load(std::size_t view) const = 0;
+
+ protected:
+  DepthMapSource(DepthMapSource&&) = default;  ///< for sources that are made by a function
 };
 
 }  // namespace trigmesh

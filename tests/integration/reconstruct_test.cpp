@@ -24,24 +24,8 @@ using ::testing::HasSubstr;
 
 constexpr std::chrono::seconds kTimeLimit{100};
 
-std::string contents(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-}
-
 void write(const fs::path& file, const std::string& bytes) {
   std::ofstream(file, std::ios::binary | std::ios::trunc) << bytes;
-}
-
-/// Every file below a folder by its relative name.
-std::map<std::string, std::string> all_files(const fs::path& folder) {
-  std::map<std::string, std::string> files;
-  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-    if (entry.is_regular_file()) {
-      files[fs::relative(entry.path(), folder).string()] = contents(entry.path());
-    }
-  }
-  return files;
 }
 
 std::string noise_png(int width_px, int height_px, std::uint64_t seed) {

@@ -5,6 +5,8 @@
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
+#include <fstream>
+#include <iterator>
 #include <sstream>
 #include <utility>
 
@@ -136,6 +138,21 @@ std::optional<std::filesystem::path> find_program(const std::string& name) {
 
 std::filesystem::path source_path(const std::filesystem::path& relative) {
   return std::filesystem::path(TRIGMESH_SOURCE_DIR) / relative;
+}
+
+std::string contents(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+}
+
+std::map<std::string, std::string> all_files(const std::filesystem::path& folder) {
+  std::map<std::string, std::string> files;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+    if (entry.is_regular_file()) {
+      files[std::filesystem::relative(entry.path(), folder).string()] = contents(entry.path());
+    }
+  }
+  return files;
 }
 
 void ScratchTest::SetUp() {

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -35,6 +36,12 @@ struct ProgramResult {
 
 /// A file of this repository, by its path from the root.
 [[nodiscard]] std::filesystem::path source_path(const std::filesystem::path& relative);
+
+/// The bytes of a file.
+[[nodiscard]] std::string contents(const std::filesystem::path& file);
+
+/// Every file below a folder by its relative name.
+[[nodiscard]] std::map<std::string, std::string> all_files(const std::filesystem::path& folder);
 
 /// A folder of its own for every test, removed afterwards.
 class ScratchTest : public ::testing::Test {

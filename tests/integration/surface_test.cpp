@@ -21,21 +21,6 @@ using ::testing::HasSubstr;
 
 constexpr std::chrono::seconds kTimeLimit{200};
 
-std::string contents(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-}
-
-std::map<std::string, std::string> all_files(const fs::path& folder) {
-  std::map<std::string, std::string> files;
-  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-    if (entry.is_regular_file()) {
-      files[fs::relative(entry.path(), folder).string()] = contents(entry.path());
-    }
-  }
-  return files;
-}
-
 /// Frames of the demo recording with small depth maps, for which its true poses are known.
 class Surface : public ScratchTest {
  protected:
