@@ -150,6 +150,11 @@ StereoProblem problem_of(std::size_t view,
   return problem;
 }
 
+/// Whether there is something to compare with, at a depth that is known about.
+bool can_have_map(const StereoPlan& plan) {
+  return !plan.sources.empty() && plan.max_depth > 0.0F;
+}
+
 /// The rounds one after the other; each finished map counts as one step of the stage.
 class DepthRounds {
  public:
@@ -172,9 +177,8 @@ class DepthRounds {
                     "stopped while making depth maps; finished maps are kept");
       }
       if (!store.has(view)) {
-        TM_ASSIGN_OR_RETURN(
-            const DepthMap map,
-            plans_[view].sources.empty() ? Result<DepthMap>(DepthMap{}) : make(view));
+        TM_ASSIGN_OR_RETURN(const DepthMap map,
+                            can_have_map(plans_[view]) ? make(view) : Result<DepthMap>(DepthMap{}));
         TM_RETURN_IF_ERROR(store.save(view, map));
       }
       progress_.advance();
@@ -190,9 +194,7 @@ class DepthRounds {
 };
 
 Result<> check_enough(std::span<const StereoPlan> plans) {
-  if (std::any_of(plans.begin(), plans.end(), [](const StereoPlan& plan) {
-        return !plan.sources.empty();
-      })) {
+  if (std::any_of(plans.begin(), plans.end(), can_have_map)) {
     return {};
   }
   return fail(ErrorCode::kInsufficientData,

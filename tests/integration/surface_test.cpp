@@ -137,6 +137,17 @@ TEST_F(Surface, PreviewNeedsNoDepthMaps) {
             2);
 }
 
+TEST_F(Surface, AModelWithoutPointsIsRefusedWithTheReason) {
+  fs::create_directories(path("bare/sparse"));
+  for (const char* name : {"cameras.txt", "images.txt"}) {
+    fs::copy_file(demo() / "gt" / name, fs::path(path("bare/sparse")) / name);
+  }
+  const ProgramResult result = run_trigmesh(
+      {"densify", path("bare"), "--images", demo().string(), "--output", path("out"), "--quiet"});
+  EXPECT_EQ(result.exit_code, 4);
+  EXPECT_THAT(result.err, HasSubstr("no depth maps can be made"));
+}
+
 TEST_F(Surface, SaysWhatIsMissing) {
   EXPECT_EQ(run_trigmesh({"mesh", path("nowhere")}).exit_code, 3);
   ASSERT_EQ(run_trigmesh(reconstruct({"--stop-after", "sparse"}), kTimeLimit).exit_code, 0);
