@@ -12,14 +12,13 @@
 #include <string>
 #include <string_view>
 
-#include <unistd.h>
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "firmware/pipeline/report_html.hpp"
 #include "tests/integration/sample_report.hpp"
 #include "tests/support/synthetic_scene.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace trigmesh {
 namespace {
@@ -57,16 +56,6 @@ class ReportPage : public ::testing::Test {
     if (!fs::exists(kBrowser)) {
       GTEST_SKIP() << kBrowser
                    << " is not installed (apt-get install chromium): the page was not looked at";
-    }
-    std::string pattern = (fs::temp_directory_path() / "trigmesh_page_XXXXXX").string();
-    ASSERT_NE(::mkdtemp(pattern.data()), nullptr);
-    folder_ = pattern;
-  }
-
-  void TearDown() override {
-    if (!folder_.empty()) {
-      std::error_code ignored;  // a browser process that ends late may still hold a file
-      fs::remove_all(folder_, ignored);
     }
   }
 
@@ -106,7 +95,8 @@ class ReportPage : public ::testing::Test {
   }
 
  private:
-  fs::path folder_;
+  const test_support::TemporaryFolder temporary_;
+  const fs::path folder_ = temporary_.path();
 };
 
 ImageOutcome outcome_named(std::string name) {

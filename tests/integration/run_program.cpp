@@ -155,16 +155,4 @@ std::map<std::string, std::string> all_files(const std::filesystem::path& folder
   return files;
 }
 
-void ScratchTest::SetUp() {
-  std::string pattern =
-      (std::filesystem::temp_directory_path() / "trigmesh_integration_XXXXXX").string();
-  ASSERT_NE(::mkdtemp(pattern.data()), nullptr);
-  folder_ = pattern;
-}
-
-void ScratchTest::TearDown() {
-  std::error_code ignored;
-  std::filesystem::remove_all(folder_, ignored);
-}
-
 }  // namespace trigmesh::test_support

@@ -9,6 +9,8 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/temporary_folder.hpp"
+
 namespace trigmesh::test_support {
 
 /// How a program ended.
@@ -46,15 +48,13 @@ struct ProgramResult {
 /// A folder of its own for every test, removed afterwards.
 class ScratchTest : public ::testing::Test {
  protected:
-  void SetUp() override;
-  void TearDown() override;
-
   /// A path in the folder.
   [[nodiscard]] std::string path(const std::string& relative) const {
     return (folder_ / relative).string();
   }
 
-  std::filesystem::path folder_;
+  const TemporaryFolder temporary_;
+  const std::filesystem::path folder_ = temporary_.path();
 };
 
 }  // namespace trigmesh::test_support

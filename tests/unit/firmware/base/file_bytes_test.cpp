@@ -7,6 +7,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/support/temporary_folder.hpp"
+
 namespace trigmesh {
 namespace {
 
@@ -14,18 +16,15 @@ namespace fs = std::filesystem;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-/// A file that is gone after the test.
+/// A file of its own for each test: suites run side by side.
 class FileBytes : public ::testing::Test {
  protected:
-  FileBytes() : path_(fs::path(::testing::TempDir()) / "trigmesh_file_bytes_test") {}
-
-  void TearDown() override { fs::remove(path_); }
-
   void write(const std::string& content) const {
     std::ofstream(path_, std::ios::binary) << content;
   }
 
-  fs::path path_;
+  const test_support::TemporaryFolder folder_;
+  const fs::path path_ = folder_.path() / "file";
 };
 
 TEST_F(FileBytes, ReadsEveryByteAsItIs) {

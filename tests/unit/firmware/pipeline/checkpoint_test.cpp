@@ -4,9 +4,9 @@
 #include <fstream>
 #include <string>
 
-#include <unistd.h>
-
 #include <gtest/gtest.h>
+
+#include "tests/support/temporary_folder.hpp"
 
 namespace trigmesh {
 namespace {
@@ -16,18 +16,11 @@ constexpr std::uint64_t kKey = 42;
 class Checkpoints : public ::testing::Test {
  protected:
   void SetUp() override {
-    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ =
-        std::filesystem::temp_directory_path() /
-        ("trigmesh_checkpoint_" + std::string(info->name()) + "_" + std::to_string(::getpid()));
-    std::filesystem::remove_all(folder_);
     auto opened = CheckpointFolder::open(folder_);
     ASSERT_TRUE(opened) << opened.error().message;
     checkpoints_ = std::move(*opened);
     ASSERT_TRUE(checkpoints_->save("piece", kKey, payload_));
   }
-
-  void TearDown() override { std::filesystem::remove_all(folder_); }
 
   [[nodiscard]] std::string stored() const {
     std::ifstream file(folder_ / "piece", std::ios::binary);
@@ -38,7 +31,8 @@ class Checkpoints : public ::testing::Test {
     std::ofstream(folder_ / "piece", std::ios::binary | std::ios::trunc) << bytes;
   }
 
-  std::filesystem::path folder_;
+  const test_support::TemporaryFolder temporary_;
+  const std::filesystem::path folder_ = temporary_.path() / "checkpoints";
   std::optional<CheckpointFolder> checkpoints_;
   const std::vector<std::uint8_t> payload_{1, 2, 3, 250, 0, 7};
 };

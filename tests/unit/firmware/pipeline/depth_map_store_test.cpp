@@ -1,12 +1,9 @@
 #include "firmware/pipeline/depth_map_store.hpp"
 
-#include <cstdlib>
-#include <filesystem>
-#include <string>
-#include <system_error>
-
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
+
+#include "tests/support/temporary_folder.hpp"
 
 namespace trigmesh {
 namespace {
@@ -44,9 +41,8 @@ TEST(StoredDepthMap, IsRefusedWhenCutOrContradictory) {
 }
 
 TEST(DepthMapStore, GivesBackOnlyWhatWasMadeOfTheSameThings) {
-  std::string name = (std::filesystem::temp_directory_path() / "trigmesh_depth_XXXXXX").string();
-  ASSERT_NE(mkdtemp(name.data()), nullptr);
-  const auto folder = CheckpointFolder::open(name);
+  const test_support::TemporaryFolder temporary;
+  const auto folder = CheckpointFolder::open(temporary.path());
   ASSERT_TRUE(folder);
   const DepthMapStore store(*folder, "depth", {7, 8});
   EXPECT_FALSE(store.has(1));

@@ -7,6 +7,8 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/temporary_folder.hpp"
+
 namespace trigmesh {
 namespace {
 
@@ -19,18 +21,8 @@ std::string contents(const fs::path& file) {
 
 class ExtendModel : public testing::Test {
  protected:
-  void SetUp() override {
-    std::string name = (fs::temp_directory_path() / "trigmesh_writer_XXXXXX").string();
-    ASSERT_NE(mkdtemp(name.data()), nullptr);
-    output_ = name;
-  }
-
-  void TearDown() override {
-    std::error_code ignored;
-    fs::remove_all(output_, ignored);
-  }
-
-  fs::path output_;
+  const test_support::TemporaryFolder temporary_;
+  const fs::path output_ = temporary_.path();
 };
 
 TEST_F(ExtendModel, KeepsWhatIsThereAndAddsOrReplaces) {

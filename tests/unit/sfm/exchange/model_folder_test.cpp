@@ -3,12 +3,11 @@
 #include <filesystem>
 #include <string>
 
-#include <unistd.h>
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "sfm/exchange/file_io.hpp"
+#include "tests/support/temporary_folder.hpp"
 #include "tests/unit/sfm/exchange/example_scene.hpp"
 
 namespace trigmesh {
@@ -21,18 +20,8 @@ using ::testing::HasSubstr;
 
 class ModelFolder : public ::testing::Test {
  protected:
-  void SetUp() override {
-    std::string pattern = (fs::temp_directory_path() / "trigmesh_model_XXXXXX").string();
-    ASSERT_NE(::mkdtemp(pattern.data()), nullptr);
-    folder_ = pattern;
-  }
-
-  void TearDown() override {
-    std::error_code ignored;
-    fs::remove_all(folder_, ignored);
-  }
-
-  fs::path folder_;
+  const test_support::TemporaryFolder temporary_;
+  const fs::path folder_ = temporary_.path();
 };
 
 TEST_F(ModelFolder, IsFoundFromEveryFolderAboveIt) {

@@ -11,6 +11,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/support/temporary_folder.hpp"
+
 namespace trigmesh {
 namespace {
 
@@ -22,17 +24,6 @@ using ::testing::HasSubstr;
 /// A folder of its own for each test, removed afterwards.
 class RecordingTest : public ::testing::Test {
  protected:
-  void SetUp() override {
-    std::string name = (fs::temp_directory_path() / "trigmesh_recording_XXXXXX").string();
-    ASSERT_NE(mkdtemp(name.data()), nullptr);
-    root_ = name;
-  }
-
-  void TearDown() override {
-    std::error_code ignored;
-    fs::remove_all(root_, ignored);
-  }
-
   void write(const std::string& name, const std::string& content = "pixels") const {
     fs::create_directories((root_ / name).parent_path());
     std::ofstream(root_ / name, std::ios::binary) << content;
@@ -46,7 +37,8 @@ class RecordingTest : public ::testing::Test {
     return result;
   }
 
-  fs::path root_;
+  const test_support::TemporaryFolder temporary_;
+  const fs::path root_ = temporary_.path();
 };
 
 TEST_F(RecordingTest, FindsMasksByTheNameWithAndWithoutItsEnding) {
