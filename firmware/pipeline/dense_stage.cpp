@@ -17,6 +17,21 @@ namespace trigmesh {
 
 namespace {
 
+/// A picture resized, with its camera and mask.
+StereoImage scaled_image(const StereoImage& image, double scale) {
+  StereoImage scaled;
+  scaled.camera = scaled_pinhole(image.camera,
+                                 scaled_side(image.camera.width_px, scale),
+                                 scaled_side(image.camera.height_px, scale));
+  scaled.cam_from_world = image.cam_from_world;
+  const cv::Size size(scaled.camera.width_px, scaled.camera.height_px);
+  cv::resize(image.grey, scaled.grey, size, 0.0, 0.0, cv::INTER_AREA);
+  if (!image.mask.empty()) {
+    cv::resize(image.mask, scaled.mask, size, 0.0, 0.0, cv::INTER_NEAREST);
+  }
+  return scaled;
+}
+
 /// The pictures at the size of the depth maps.
 Result<std::vector<StereoImage>> load_stereo_images(const DenseInput& input,
                                                     const StageContext& context) {
@@ -31,19 +46,12 @@ Result<std::vector<StereoImage>> load_stereo_images(const DenseInput& input,
       failures[i] = picture.error();
       return;
     }
-    const DenseView& view = input.views[i];
-    StereoImage& image = images[i];
-    image.camera = scaled_pinhole(view.camera,
-                                  scaled_side(view.camera.width_px, input.plan.map_scale),
-                                  scaled_side(view.camera.height_px, input.plan.map_scale));
-    image.cam_from_world = view.cam_from_world;
-    const cv::Size size(image.camera.width_px, image.camera.height_px);
-    cv::Mat grey;
-    cv::cvtColor(picture->rgb, grey, cv::COLOR_RGB2GRAY);
-    cv::resize(grey, image.grey, size, 0.0, 0.0, cv::INTER_AREA);
-    if (!picture->mask.empty()) {
-      cv::resize(picture->mask, image.mask, size, 0.0, 0.0, cv::INTER_NEAREST);
-    }
+    StereoImage image{.grey = {},
+                      .mask = picture->mask,
+                      .camera = input.views[i].camera,
+                      .cam_from_world = input.views[i].cam_from_world};
+    cv::cvtColor(picture->rgb, image.grey, cv::COLOR_RGB2GRAY);
+    images[i] = scaled_image(image, input.plan.map_scale);
   });
   for (const std::optional<Error>& failure : failures) {
     if (failure) {
@@ -75,8 +83,9 @@ Result<std::vector<std::uint64_t>> photometric_keys(const DenseInput& input,
     of_view.push_back(key_of_view(input.views[i], content));
   }
   const PatchMatchOptions& options = input.plan.patch_match;
-  const std::uint64_t settings = content_hash(fmt::format("{} {} {} {} {} {} {} {} {}",
+  const std::uint64_t settings = content_hash(fmt::format("{} {} {} {} {} {} {} {} {} {}",
                                                           input.plan.map_scale,
+                                                          input.plan.first_round_scale,
                                                           options.levels,
                                                           options.coarse_iterations,
                                                           options.middle_iterations,
@@ -136,13 +145,18 @@ Result<PosedDepthMap> load_posed(const DepthMapSource& maps,
   return PosedDepthMap{std::move(map), views[view].cam_from_world};
 }
 
+/// Stereo of one view with its sources, at `scale` times the size of `images`.
 StereoProblem problem_of(std::size_t view,
                          const StereoPlan& plan,
-                         std::span<const StereoImage> images) {
+                         std::span<const StereoImage> images,
+                         double scale) {
+  const auto at_scale = [&](std::size_t i) {
+    return scale == 1.0 ? images[i] : scaled_image(images[i], scale);
+  };
   StereoProblem problem;
-  problem.reference = images[view];
+  problem.reference = at_scale(view);
   for (const std::size_t source : plan.sources) {
-    problem.sources.push_back(images[source]);
+    problem.sources.push_back(at_scale(source));
   }
   problem.seeds_in_cam = plan.seeds_in_cam;
   problem.min_depth = plan.min_depth;
@@ -218,12 +232,14 @@ Result<DepthMaps> make_depth_maps(const DenseInput& input, const StageContext& c
 
   const DepthMapStore photometric(context.checkpoints, "photometric", photometric_key);
   TM_RETURN_IF_ERROR(rounds.run(photometric, [&](std::size_t view) {
-    return estimate_depth_map(problem_of(view, plans[view], images), options, context.executor);
+    return estimate_depth_map(problem_of(view, plans[view], images, input.plan.first_round_scale),
+                              options,
+                              context.executor);
   }));
 
   const DepthMapStore geometric(context.checkpoints, "geometric", geometric_key);
   TM_RETURN_IF_ERROR(rounds.run(geometric, [&](std::size_t view) -> Result<DepthMap> {
-    StereoProblem problem = problem_of(view, plans[view], images);
+    StereoProblem problem = problem_of(view, plans[view], images, 1.0);
     TM_ASSIGN_OR_RETURN(problem.initial, photometric.load(view));
     TM_ASSIGN_OR_RETURN(problem.source_maps, load_maps(photometric, plans[view].sources));
     return estimate_depth_map(problem, options, context.executor);

@@ -117,13 +117,19 @@ Result<> write_model(const std::filesystem::path& output,
 
 Result<> write_timings(const std::filesystem::path& output, std::span<const StageTime> times) {
   nlohmann::ordered_json json;
-  double total = 0.0;
+  const auto add = [&json](
+                       const char* kind, std::string_view stage, std::chrono::nanoseconds time) {
+    json[kind][std::string(stage)] = std::chrono::duration<double>(time).count();
+  };
+  StageTime total;
   for (const StageTime& time : times) {
-    const double seconds = std::chrono::duration<double>(time.duration).count();
-    json["seconds"][std::string(to_string(time.stage))] = seconds;
-    total += seconds;
+    add("seconds", to_string(time.stage), time.duration);
+    add("cpu_seconds", to_string(time.stage), time.cpu_time);
+    total.duration += time.duration;
+    total.cpu_time += time.cpu_time;
   }
-  json["seconds"]["total"] = total;
+  add("seconds", "total", total.duration);
+  add("cpu_seconds", "total", total.cpu_time);
   return write_file_atomically(output / "timings.json", json.dump(2) + "\n");
 }
 

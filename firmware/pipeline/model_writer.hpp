@@ -30,7 +30,8 @@ namespace trigmesh {
                                     const ReconstructionReport& report,
                                     const ReportAttachments& attachments = {});
 
-/// Writes `output`/timings.json: seconds per stage. Clock times live here and nowhere else.
+/// Writes `output`/timings.json: seconds and processor seconds per stage. Clock times live here and
+/// nowhere else.
 [[nodiscard]] Result<> write_timings(const std::filesystem::path& output,
                                      std::span<const StageTime> times);
 

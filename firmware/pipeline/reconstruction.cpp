@@ -138,27 +138,23 @@ ReconstructionReport report_on(const PhotoSet& photos,
   return build_report(input);
 }
 
-/// A report on a model that comes without its history: which images were refused and how they
-/// matched is not known.
+/// A report on a model that was made before.
 ReconstructionReport report_on_model(const PhotoSet& photos,
                                      const ReconstructionOptions& options,
-                                     const Scene& scene) {
-  std::vector<ImageOutcome> outcomes;
-  for (const View& view : scene.views) {
-    ImageOutcome outcome;
-    outcome.name = view.name;
-    outcome.features = view.keypoints_px.size();
-    outcome.component = view.cam_from_world ? 0 : -1;
-    outcome.reason = view.cam_from_world ? RefusalReason::kNone : RefusalReason::kNoGivenPose;
-    outcomes.push_back(std::move(outcome));
-  }
-  const std::vector<IntrinsicsOrigin> origins(scene.cameras.size(), IntrinsicsOrigin::kGiven);
+                                     const ExistingModel& model) {
+  const ReportHistory& history = model.history;
   ReportInput input;
-  input.components = std::span(&scene, 1);
-  input.images = outcomes;
-  input.intrinsics_origins = origins;
+  input.components = model.components;
+  input.images = history.images;
+  input.pairs = history.pairs;
+  input.intrinsics_origins = history.intrinsics_origins;
+  input.settings = history.settings;
+  if (!model.warning.empty()) {
+    input.notes.push_back({NoteSeverity::kWarning, model.warning});
+  }
   input.software_version = options.software_version;
-  input.input_description = photos.description;
+  input.input_description =
+      history.input_description.empty() ? photos.description : history.input_description;
   return build_report(input);
 }
 
@@ -270,7 +266,7 @@ Result<ReconstructionSummary> reconstruct(const PhotoSet& photos,
   return summary;
 }
 
-Result<ReconstructionSummary> continue_model(const Scene& scene,
+Result<ReconstructionSummary> continue_model(const ExistingModel& model,
                                              const PhotoSet& photos,
                                              const std::filesystem::path& output,
                                              const ReconstructionOptions& options,
@@ -282,16 +278,15 @@ Result<ReconstructionSummary> continue_model(const Scene& scene,
   TM_ASSIGN_OR_RETURN(const CheckpointFolder checkpoints, CheckpointFolder::open(output / "work"));
   WorkerPool pool(options.num_threads);
   Stopwatch stopwatch(clock);
-  const std::vector<Scene> components{scene};
-  ReconstructionSummary summary{report_on_model(photos, options, scene), {}};
+  ReconstructionSummary summary{report_on_model(photos, options, model), {}};
   std::error_code error;
   if (!std::filesystem::is_directory(output / "model", error)) {
-    TM_RETURN_IF_ERROR(write_model(output, components, summary.report));
+    TM_RETURN_IF_ERROR(write_model(output, model.components, summary.report));
     stopwatch.finish(Stage::kWrite);
   }
   const StageContext context{pool, checkpoints, listener, stop};
-  TM_RETURN_IF_ERROR(
-      build_surface({photos, components, output, options}, context, stopwatch, summary.report));
+  TM_RETURN_IF_ERROR(build_surface(
+      {photos, model.components, output, options}, context, stopwatch, summary.report));
   summary.times = stopwatch.times();
   TM_RETURN_IF_ERROR(write_timings(output, summary.times));
   return summary;

@@ -12,6 +12,7 @@
 #include "firmware/base/result.hpp"
 #include "firmware/pipeline/build_options.hpp"
 #include "firmware/pipeline/camera_groups.hpp"
+#include "firmware/pipeline/existing_model.hpp"
 #include "firmware/pipeline/photo_set.hpp"
 #include "firmware/pipeline/progress.hpp"
 #include "firmware/pipeline/report.hpp"
@@ -67,7 +68,7 @@ struct ReconstructionSummary {
 /// The stages after mapping on a model that exists (ours or another program's, its photographs by
 /// the names of its images): adds their results to `output`/model, which is made when missing.
 /// Errors as above; kInsufficientData also when the model has no points.
-[[nodiscard]] Result<ReconstructionSummary> continue_model(const Scene& scene,
+[[nodiscard]] Result<ReconstructionSummary> continue_model(const ExistingModel& model,
                                                            const PhotoSet& photos,
                                                            const std::filesystem::path& output,
                                                            const ReconstructionOptions& options,

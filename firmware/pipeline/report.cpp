@@ -187,13 +187,11 @@ void add_views(ReconstructionReport& report,
       continue;
     }
     ImageReport& image = report.images[row->second];
-    if (!image.group && index(view.camera) < scene.cameras.size()) {
-      image.group = index(view.camera);
-    }
     if (!view.cam_from_world || image.component) {
       continue;
     }
     image.component = component;
+    image.group = index(view.camera);
     image.observations = sums.view_observations[i];
     image.rmse_px =
         sums.view_projected[i] == 0

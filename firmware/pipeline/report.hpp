@@ -126,7 +126,7 @@ struct ImageReport {
   std::size_t observations = 0;
   double rmse_px = 0.0;
   std::optional<std::size_t> component;  ///< which model holds its pose
-  std::optional<std::size_t> group;      ///< its camera group, when a component has it
+  std::optional<std::size_t> group;      ///< its camera group, when it has a pose
 };
 
 /// Everything that the report shows: plain data, a pure function of its input.

@@ -9,7 +9,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int kSchema = 1;
 constexpr int kIndent = 2;
 constexpr int kPixelDigits = 4;
 constexpr int kAngleDigits = 3;
@@ -212,7 +211,7 @@ Json summary(const ReconstructionReport& report) {
 
 std::string render_report_json(const ReconstructionReport& report) {
   Json document = {
-      {"schema", kSchema},
+      {"schema", kReportSchema},
       {"software", "trigmesh " + report.software_version},
       {"input", report.input_description},
       {"verdict", to_string(report.verdict)},

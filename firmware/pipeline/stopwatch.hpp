@@ -12,18 +12,22 @@ namespace trigmesh {
 struct StageTime {
   Stage stage = Stage::kExtract;
   std::chrono::nanoseconds duration{};
+  std::chrono::nanoseconds cpu_time{};  ///< of all threads
 };
 
 /// Measures the stages one after the other. `clock` outlives it.
 class Stopwatch {
  public:
-  explicit Stopwatch(const Clock& clock) : clock_(&clock), last_(clock.now()) {}
+  explicit Stopwatch(const Clock& clock)
+      : clock_(&clock), last_(clock.now()), last_cpu_(clock.cpu_time()) {}
 
   /// The time since the stage before ended belongs to `stage`.
   void finish(Stage stage) {
     const auto now = clock_->now();
-    times_.push_back({stage, now - last_});
+    const auto cpu = clock_->cpu_time();
+    times_.push_back({stage, now - last_, cpu - last_cpu_});
     last_ = now;
+    last_cpu_ = cpu;
   }
 
   [[nodiscard]] std::vector<StageTime> times() const { return times_; }
@@ -31,6 +35,7 @@ class Stopwatch {
  private:
   const Clock* clock_;
   std::chrono::nanoseconds last_;
+  std::chrono::nanoseconds last_cpu_;
   std::vector<StageTime> times_;
 };
 

@@ -24,6 +24,8 @@ constexpr std::uint64_t kMapPixelsPerPoint = 4;
 constexpr std::uint64_t kBytesPerFace = 400;
 constexpr int kSmallestSidePx = 160;
 constexpr double kScaleStep = 0.75;
+// The first round of stereo works at half the size of the maps, but not below this side.
+constexpr double kSmallestFirstRoundSidePx = 640.0;
 // Voxels and extraction of the surface when no limit asks for less.
 constexpr std::size_t kVoxelBudget = std::size_t{1200} << 20U;
 constexpr std::size_t kSmallestVoxelBudget = std::size_t{64} << 20U;
@@ -62,6 +64,11 @@ double wanted_scale(std::span<const DenseView> views, QualityPreset preset) {
                                  std::min(full, static_cast<double>(sizes.smallest_side_px)),
                                  static_cast<double>(sizes.largest_side_px));
   return side / full;
+}
+
+double first_round_scale(std::span<const DenseView> views, double map_scale) {
+  const double side = std::max(1.0, longest_side(views) * map_scale);
+  return std::clamp(kSmallestFirstRoundSidePx / side, 0.5, 1.0);
 }
 
 struct PixelCounts {
@@ -184,11 +191,12 @@ Result<SurfacePlan> plan_surface(std::span<const DenseView> views,
                                                  : sizes_of(options.preset).max_faces;
   plan.surface.max_memory_bytes = kVoxelBudget;
   plan.texture.atlas.page_size_px = options.texture_size_px;
+  if (limit_bytes != 0 && options.preset != QualityPreset::kPreview) {
+    TM_RETURN_IF_ERROR(shrink_maps(views, limit_bytes, plan));
+  }
+  plan.first_round_scale = first_round_scale(views, plan.map_scale);
   if (limit_bytes == 0) {
     return plan;
-  }
-  if (options.preset != QualityPreset::kPreview) {
-    TM_RETURN_IF_ERROR(shrink_maps(views, limit_bytes, plan));
   }
   if (options.last_stage >= LastStage::kMesh && mesh_bytes(plan) > limit_bytes) {
     // The surface stage makes its voxels larger until they fit, and says so.

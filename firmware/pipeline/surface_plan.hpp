@@ -21,6 +21,8 @@ namespace trigmesh {
 /// How the stages after mapping work, within a memory limit.
 struct SurfacePlan {
   double map_scale = 1.0;  ///< size of the depth maps / size of the pictures, (0, 1]
+  /// Size of the maps of the first, photometric round / size of the depth maps, (0, 1].
+  double first_round_scale = 1.0;
   ViewSelectionOptions selection;
   PatchMatchOptions patch_match;
   DepthFilterOptions filter;

@@ -9,8 +9,8 @@
 #include <fmt/format.h>
 
 #include "firmware/base/check.hpp"
+#include "firmware/pipeline/existing_model.hpp"
 #include "firmware/pipeline/reconstruction.hpp"
-#include "sfm/exchange/model_folder.hpp"
 #include "tools/trigmesh/command.hpp"
 #include "tools/trigmesh/interrupt.hpp"
 #include "tools/trigmesh/photo_input.hpp"
@@ -68,7 +68,7 @@ void print_files(const std::string& output) {
 
 Result<> run(const StageArguments& arguments, LastStage last) {
   const std::string output = arguments.output.empty() ? arguments.model : arguments.output;
-  TM_ASSIGN_OR_RETURN(const Scene scene, read_model(arguments.model));
+  TM_ASSIGN_OR_RETURN(const ExistingModel model, open_existing_model(arguments.model));
   TM_ASSIGN_OR_RETURN(const std::string folder, photo_folder(arguments));
   TM_ASSIGN_OR_RETURN(
       const PhotoSet photos,
@@ -89,7 +89,7 @@ Result<> run(const StageArguments& arguments, LastStage last) {
                             clock);
     TM_ASSIGN_OR_RETURN(
         const ReconstructionSummary summary,
-        continue_model(scene, photos, output, options, clock, printer, interrupt.token()));
+        continue_model(model, photos, output, options, clock, printer, interrupt.token()));
     notes = summary.report.notes;
   }
   for (const ReportNote& note : notes) {

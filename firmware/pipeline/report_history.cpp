@@ -1,0 +1,172 @@
+#include "firmware/pipeline/report_history.hpp"
+
+#include <array>
+#include <cstddef>
+#include <span>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "firmware/base/check.hpp"
+#include "firmware/pipeline/report_json.hpp"
+
+namespace trigmesh {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr std::size_t kMaxCameraGroups = 100'000;
+
+constexpr std::array kRefusalReasons{
+    RefusalReason::kNone,
+    RefusalReason::kUnreadable,
+    RefusalReason::kTooSmall,
+    RefusalReason::kTooFewFeatures,
+    RefusalReason::kDuplicate,
+    RefusalReason::kNoOverlap,
+    RefusalReason::kPureRotation,
+    RefusalReason::kNoParallax,
+    RefusalReason::kTooFewMapMatches,
+    RefusalReason::kPoseRejected,
+    RefusalReason::kPoseUnstable,
+    RefusalReason::kOtherComponent,
+    RefusalReason::kNoGivenPose,
+};
+constexpr std::array kTwoViewKinds{
+    TwoViewKind::kNone,
+    TwoViewKind::kGeneral,
+    TwoViewKind::kPlanar,
+    TwoViewKind::kPureRotation,
+    TwoViewKind::kWatermark,
+    TwoViewKind::kDuplicate,
+};
+constexpr std::array kOrigins{
+    IntrinsicsOrigin::kGiven, IntrinsicsOrigin::kPriorRefined, IntrinsicsOrigin::kSolved};
+
+tl::unexpected<Error> bad_member(const char* name, const char* reason) {
+  return fail(ErrorCode::kCorruptData, "cannot read the report: member \"{}\" {}", name, reason);
+}
+
+Result<std::string> text_of(const Json& object, const char* name) {
+  const auto member = object.find(name);
+  if (member == object.end() || !member->is_string()) {
+    return bad_member(name, "is no text");
+  }
+  return member->get<std::string>();
+}
+
+Result<std::size_t> count_of(const Json& object, const char* name) {
+  const auto member = object.find(name);
+  if (member == object.end() || !member->is_number_unsigned()) {
+    return bad_member(name, "is no whole number of 0 or more");
+  }
+  return member->get<std::size_t>();
+}
+
+template <typename Enum>
+Result<Enum> one_of(const Json& object, const char* name, std::span<const Enum> values) {
+  TM_ASSIGN_OR_RETURN(const std::string text, text_of(object, name));
+  for (const Enum value : values) {
+    if (to_string(value) == text) {
+      return value;
+    }
+  }
+  return bad_member(name, "has a value that is not known");
+}
+
+Result<ImageOutcome> parse_image(const Json& json) {
+  ImageOutcome image;
+  TM_ASSIGN_OR_RETURN(image.name, text_of(json, "name"));
+  TM_ASSIGN_OR_RETURN(image.reason, one_of<RefusalReason>(json, "status", kRefusalReasons));
+  TM_ASSIGN_OR_RETURN(image.detail, text_of(json, "detail"));
+  TM_ASSIGN_OR_RETURN(image.features, count_of(json, "features"));
+  TM_ASSIGN_OR_RETURN(image.overlapping_images, count_of(json, "overlapping_images"));
+  TM_ASSIGN_OR_RETURN(image.map_matches, count_of(json, "map_matches"));
+  TM_ASSIGN_OR_RETURN(image.map_inliers, count_of(json, "map_inliers"));
+  return image;  // the rest is computed from the scenes
+}
+
+Result<PairEvidence> parse_pair(const Json& json, std::size_t image_count) {
+  PairEvidence pair;
+  TM_ASSIGN_OR_RETURN(const std::size_t first, count_of(json, "first"));
+  TM_ASSIGN_OR_RETURN(const std::size_t second, count_of(json, "second"));
+  if (first >= second || second >= image_count) {
+    return bad_member("second", "is not the position of a later image");
+  }
+  pair.pair = {id_of<ViewId>(first), id_of<ViewId>(second)};
+  TM_ASSIGN_OR_RETURN(pair.kind, one_of<TwoViewKind>(json, "kind", kTwoViewKinds));
+  TM_ASSIGN_OR_RETURN(pair.candidates, count_of(json, "candidates"));
+  TM_ASSIGN_OR_RETURN(pair.inliers, count_of(json, "inliers"));
+  return pair;
+}
+
+Result<ReportSetting> parse_setting(const Json& json) {
+  ReportSetting setting;
+  TM_ASSIGN_OR_RETURN(setting.name, text_of(json, "name"));
+  TM_ASSIGN_OR_RETURN(setting.value, text_of(json, "value"));
+  return setting;
+}
+
+/// Calls `parse` for each element of the array `name`.
+template <typename Parse>
+Result<> for_each_in(const Json& document, const char* name, const Parse& parse) {
+  const auto array = document.find(name);
+  if (array == document.end() || !array->is_array()) {
+    return bad_member(name, "is no list");
+  }
+  for (const Json& element : *array) {
+    if (!element.is_object()) {
+      return bad_member(name, "has an element that is no object");
+    }
+    TM_RETURN_IF_ERROR(parse(element));
+  }
+  return {};
+}
+
+Result<> add_origin(const Json& camera, std::vector<IntrinsicsOrigin>& origins) {
+  TM_ASSIGN_OR_RETURN(const std::size_t group, count_of(camera, "group"));
+  if (group >= kMaxCameraGroups) {
+    return bad_member("group", "is too large");
+  }
+  if (origins.size() <= group) {
+    origins.resize(group + 1, IntrinsicsOrigin::kSolved);
+  }
+  TM_ASSIGN_OR_RETURN(origins[group], one_of<IntrinsicsOrigin>(camera, "origin", kOrigins));
+  return {};
+}
+
+}  // namespace
+
+Result<ReportHistory> parse_report_history(std::string_view json) {
+  const Json document = Json::parse(json, nullptr, false);
+  if (!document.is_object()) {
+    return fail(ErrorCode::kCorruptData, "cannot read the report: it is not a JSON object");
+  }
+  TM_ASSIGN_OR_RETURN(const std::size_t schema, count_of(document, "schema"));
+  if (schema != kReportSchema) {
+    return bad_member("schema", "is not that of this program");
+  }
+  ReportHistory history;
+  TM_ASSIGN_OR_RETURN(history.input_description, text_of(document, "input"));
+  TM_RETURN_IF_ERROR(for_each_in(document, "images", [&](const Json& element) -> Result<> {
+    TM_ASSIGN_OR_RETURN(ImageOutcome image, parse_image(element));
+    history.images.push_back(std::move(image));
+    return {};
+  }));
+  TM_RETURN_IF_ERROR(for_each_in(document, "pairs", [&](const Json& element) -> Result<> {
+    TM_ASSIGN_OR_RETURN(PairEvidence pair, parse_pair(element, history.images.size()));
+    history.pairs.push_back(pair);
+    return {};
+  }));
+  TM_RETURN_IF_ERROR(for_each_in(document, "settings", [&](const Json& element) -> Result<> {
+    TM_ASSIGN_OR_RETURN(ReportSetting setting, parse_setting(element));
+    history.settings.push_back(std::move(setting));
+    return {};
+  }));
+  TM_RETURN_IF_ERROR(for_each_in(document, "cameras", [&](const Json& element) {
+    return add_origin(element, history.intrinsics_origins);
+  }));
+  return history;
+}
+
+}  // namespace trigmesh
