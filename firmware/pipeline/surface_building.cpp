@@ -10,6 +10,8 @@
 #include <opencv2/core.hpp>
 
 #include "firmware/base/check.hpp"
+#include "firmware/base/file_bytes.hpp"
+#include "firmware/pipeline/binary_stream.hpp"
 #include "firmware/pipeline/dense_stage.hpp"
 #include "firmware/pipeline/model_writer.hpp"
 #include "firmware/pipeline/photo_images.hpp"
@@ -25,6 +27,8 @@
 namespace trigmesh {
 
 namespace {
+
+constexpr std::size_t kMaxCloudBytes = std::size_t{8} << 30U;
 
 /// Everything that the steps share.
 struct Work {
@@ -62,28 +66,20 @@ Result<> publish(const Work& work, const std::vector<NamedFile>& files) {
       {.glb = work.glb, .glb_name = "textured.glb", .depth_pictures = work.pictures});
 }
 
-/// A cloud and the file that holds it.
-struct WrittenCloud {
-  DenseCloud points;
-  std::string ply;
-};
-
-/// The cloud that was stored under the key of its maps, or the one that is made now and stored.
-Result<WrittenCloud> stored_or_fused_cloud(const Work& work,
-                                           const DenseInput& input,
-                                           const DepthMaps& depth) {
-  const CheckpointFolder& checkpoints = work.context.checkpoints;
-  if (const auto stored = checkpoints.load("dense", depth.key)) {
-    std::string ply(stored->begin(), stored->end());
-    if (auto points = read_dense_ply(ply)) {
-      return WrittenCloud{std::move(*points), std::move(ply)};
-    }
+/// The cloud of a former run in the model, when its file is the one that was made of these maps.
+std::optional<DenseCloud> stored_cloud(const Work& work, const DepthMaps& depth) {
+  const auto told = work.context.checkpoints.load("dense", depth.key);
+  if (!told) {
+    return std::nullopt;
   }
-  TM_ASSIGN_OR_RETURN(DenseCloud points, fuse_maps(input, depth, work.context));
-  std::string ply = write_dense_ply(points);
-  TM_RETURN_IF_ERROR(checkpoints.save(
-      "dense", depth.key, {reinterpret_cast<const std::uint8_t*>(ply.data()), ply.size()}));
-  return WrittenCloud{std::move(points), std::move(ply)};
+  const auto ply = read_file(work.input.output / "model" / "dense.ply", kMaxCloudBytes);
+  BinaryWriter hash;
+  hash.value(ply ? content_hash(*ply) : 0);
+  if (!ply || hash.take() != *told) {
+    return std::nullopt;
+  }
+  auto points = read_dense_ply(*ply);
+  return points ? std::optional(std::move(*points)) : std::nullopt;
 }
 
 Result<> picture_depth(Work& work, const DepthMaps& depth) {
@@ -125,13 +121,25 @@ Result<DenseSection> sum_up(const Work& work, const DepthMaps& depth, const Dens
   return section;
 }
 
+/// Adds the cloud and what is known of it to the model; the cloud is freed on the way.
 Result<> densify(Work& work, const DenseInput& input, const DepthMaps& depth) {
   TM_RETURN_IF_ERROR(check_not_stopped(work.context, "the dense cloud"));
-  TM_ASSIGN_OR_RETURN(WrittenCloud cloud, stored_or_fused_cloud(work, input, depth));
-  TM_ASSIGN_OR_RETURN(work.report.dense, sum_up(work, depth, cloud.points));
   TM_RETURN_IF_ERROR(picture_depth(work, depth));
+  if (const auto stored = stored_cloud(work, depth)) {
+    TM_ASSIGN_OR_RETURN(work.report.dense, sum_up(work, depth, *stored));
+    work.stopwatch.finish(Stage::kFuse);
+    return publish(work, {});
+  }
+  TM_ASSIGN_OR_RETURN(DenseCloud cloud, fuse_maps(input, depth, work.context));
+  TM_ASSIGN_OR_RETURN(work.report.dense, sum_up(work, depth, cloud));
+  std::vector<NamedFile> files(1);
+  files[0] = {"dense.ply", write_dense_ply(cloud)};
+  DenseCloud().swap(cloud);
+  BinaryWriter hash;
+  hash.value(content_hash(files[0].bytes));
   work.stopwatch.finish(Stage::kFuse);
-  return publish(work, {{"dense.ply", std::move(cloud.ply)}});
+  TM_RETURN_IF_ERROR(publish(work, files));
+  return work.context.checkpoints.save("dense", depth.key, hash.take());
 }
 
 SurfaceSection sum_up(const SurfaceResult& made) {
@@ -162,7 +170,9 @@ Result<TriangleMesh> add_mesh(Work& work, SurfaceResult made) {
   work.report.surface = sum_up(made);
   warn(work.report, work.report.surface->lowered);
   work.stopwatch.finish(Stage::kSurface);
-  TM_RETURN_IF_ERROR(publish(work, {{"mesh.ply", write_mesh_ply(made.mesh)}}));
+  std::vector<NamedFile> files(1);
+  files[0] = {"mesh.ply", write_mesh_ply(made.mesh)};
+  TM_RETURN_IF_ERROR(publish(work, files));
   return std::move(made.mesh);
 }
 

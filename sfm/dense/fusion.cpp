@@ -136,6 +136,28 @@ FusedRow fuse_row(const FusionTask& task, int y) {
   return out;
 }
 
+/// Adds the points of a view to the cloud and marks what they use of its neighbours. In bands of
+/// rows, because the marks of a row take more memory than its points.
+void fuse_view(const FusionTask& task,
+               std::vector<cv::Mat>& used,
+               DenseCloud& cloud,
+               Executor& executor) {
+  constexpr int kBandRows = 32;
+  const int height = task.loaded.front().posed.map.depth.rows;
+  for (int top = 0; top < height; top += kBandRows) {
+    std::vector<FusedRow> rows(static_cast<std::size_t>(std::min(kBandRows, height - top)));
+    executor.for_each_index(rows.size(), [&](std::size_t row) {
+      rows[row] = fuse_row(task, top + static_cast<int>(row));
+    });
+    for (const FusedRow& row : rows) {
+      cloud.insert(cloud.end(), row.points.begin(), row.points.end());
+      for (const UsedPixel& pixel : row.used) {
+        used[pixel.view].at<std::uint8_t>(pixel.y, pixel.x) = 255;
+      }
+    }
+  }
+}
+
 Result<std::vector<LoadedView>> load_group(const FusionInput& input, std::size_t v) {
   std::vector<LoadedView> loaded;
   TM_ASSIGN_OR_RETURN(LoadedView own, load_view(input, v));
@@ -193,18 +215,8 @@ Result<DenseCloud> fuse_depth_maps(const FusionInput& input,
         comparisons.emplace_back(loaded.front().posed, view.posed, options.agreement);
       }
     }
-    const FusionTask task{loaded, comparisons, options, used[v]};
-    std::vector<FusedRow> rows(static_cast<std::size_t>(used[v].rows));
-    executor.for_each_index(
-        rows.size(), [&](std::size_t row) { rows[row] = fuse_row(task, static_cast<int>(row)); });
-    used[v].release();
-    used[v] = cv::Mat(loaded.front().posed.map.depth.size(), CV_8UC1, cv::Scalar(255));
-    for (const FusedRow& row : rows) {
-      cloud.insert(cloud.end(), row.points.begin(), row.points.end());
-      for (const UsedPixel& pixel : row.used) {
-        used[pixel.view].at<std::uint8_t>(pixel.y, pixel.x) = 255;
-      }
-    }
+    fuse_view({loaded, comparisons, options, used[v]}, used, cloud, executor);
+    used[v] = cv::Scalar(255);
     if (cloud.size() > options.max_points) {
       return fail(
           ErrorCode::kLimitExceeded, "the cloud has more than {} points", options.max_points);

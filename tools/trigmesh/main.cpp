@@ -4,6 +4,8 @@
 #include <exception>
 #include <new>
 
+#include <malloc.h>
+
 #include <CLI/CLI.hpp>
 
 #include "tools/trigmesh/command.hpp"
@@ -59,6 +61,9 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  // Pictures and maps go back to the system when they are freed: glibc would raise this threshold
+  // with each of them and keep their memory, which --memory-limit cannot foresee.
+  ::mallopt(M_MMAP_THRESHOLD, 1 << 20);
   try {
     return run(argc, argv);
   } catch (const std::bad_alloc&) {
