@@ -9,6 +9,7 @@
 #include "sfm/surface/hole_filling.hpp"
 #include "sfm/surface/marching_cubes.hpp"
 #include "sfm/surface/mesh_cleaning.hpp"
+#include "sfm/surface/mesh_repair.hpp"
 #include "sfm/surface/mesh_simplification.hpp"
 #include "sfm/surface/mesh_topology.hpp"
 #include "sfm/surface/vertex_votes.hpp"
@@ -100,6 +101,7 @@ Result<SurfaceResult> make_surface(const SurfaceInput& input,
                 report.extracted_faces,
                 report.view_count);
   }
+  make_two_manifold(mesh);
   report.faces_before_simplification = mesh.faces.size();
   report.simplification_error = simplify(options.max_faces, mesh);
   mesh.normals = vertex_normals(mesh);

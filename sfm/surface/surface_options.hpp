@@ -70,7 +70,7 @@ struct SurfaceReport {
   std::size_t removed_component_faces = 0;
   std::size_t filled_holes = 0;
   std::size_t faces_before_simplification = 0;
-  std::size_t non_manifold_edges = 0;  ///< of the result: edges with more than two faces
+  std::size_t non_manifold_edges = 0;  ///< of the result; 0, else something is wrong
   double simplification_error = 0.0;   ///< scene units; 0 = nothing was simplified
   std::size_t open_hole_count = 0;     ///< all that were left open
   std::vector<SurfaceHole> open_holes;  ///< the largest `kMaxReportedHoles`, by falling perimeter

@@ -1,5 +1,7 @@
 #include "sfm/surface/mesh_cleaning.hpp"
 
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 #include "sfm/surface/mesh_simplification.hpp"
@@ -44,6 +46,32 @@ TEST(MeshSimplification, KeepsAFlatSheetAndItsBorder) {
     area += a;
   }
   EXPECT_NEAR(area, 900.0, 0.1);
+}
+
+TEST(MeshSimplification, KeepsASurfaceFullOfThinWallsTwoManifoldAndClosed) {
+  SerialExecutor serial;
+  TriangleMesh mesh = extract_surface(test::make_noise(7), 0.5F, serial);
+  simplify(mesh.faces.size() / 8, mesh);
+  ASSERT_GT(mesh.faces.size(), 1000U);
+  EXPECT_TRUE(test::is_two_manifold(mesh));
+  EXPECT_EQ(analyze_topology(mesh).boundary_edges, 0U);
+}
+
+TEST(MeshTopology, NormalsDoNotDependOnHowASideIsCut) {
+  // A corner of a cube whose side x = 0 is cut into many triangles around the corner.
+  TriangleMesh mesh;
+  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  mesh.faces = {{0, 2, 1}, {0, 1, 3}};
+  std::uint32_t before = 3;
+  for (int step = 1; step <= 9; ++step) {
+    const float angle = static_cast<float>(step) / 9.0F * 1.5707964F;
+    mesh.positions.emplace_back(0.0F, std::sin(angle), std::cos(angle));
+    const auto added = static_cast<std::uint32_t>(mesh.positions.size() - 1);
+    mesh.faces.push_back({0, before, added});
+    before = added;
+  }
+  const Eigen::Vector3f expected = Eigen::Vector3f(-1, -1, -1).normalized();
+  EXPECT_LT((vertex_normals(mesh)[0] - expected).norm(), 1e-4F);
 }
 
 }  // namespace
