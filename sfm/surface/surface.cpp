@@ -21,6 +21,7 @@ namespace {
 constexpr double kSupportVoxels = 1.5;
 // Neighbouring vertices are about one voxel apart: what stands out by this much is no surface.
 constexpr double kSpikeVoxels = 0.9;
+constexpr int kBorderPasses = 10;
 
 /// What the views say about a mesh: support and colour of its vertices.
 Result<VertexVotes> ask_views(const SurfaceInput& input,
@@ -101,6 +102,7 @@ Result<SurfaceResult> make_surface(const SurfaceInput& input,
                 report.view_count);
   }
   make_two_manifold(mesh);
+  smooth_borders(kBorderPasses, mesh);
   report.faces_before_simplification = mesh.faces.size();
   report.simplification_error = simplify(options.max_faces, mesh);
   mesh.normals = vertex_normals(mesh);
