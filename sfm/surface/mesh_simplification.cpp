@@ -1,9 +1,11 @@
 #include "sfm/surface/mesh_simplification.hpp"
 
+#include <utility>
 #include <vector>
 
 #include <meshoptimizer.h>
 
+#include "sfm/surface/mesh_fitting.hpp"
 #include "sfm/surface/mesh_repair.hpp"
 
 namespace trigmesh {
@@ -38,10 +40,12 @@ double simplify(std::size_t max_faces, TriangleMesh& mesh) {
                                              kMaxErrorRatio,
                                              0,
                                              &error);
+  const std::vector<std::array<std::uint32_t, 3>> fine_faces = std::move(mesh.faces);
   mesh.faces.resize(count / 3);
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
     mesh.faces[f] = {indices[3 * f], indices[3 * f + 1], indices[3 * f + 2]};
   }
+  fit_to_fine_surface(fine_faces, mesh);
   // Collapses fold thin parts together; meshoptimizer does not look for that.
   make_two_manifold(mesh);
   return static_cast<double>(error) * static_cast<double>(extent);
