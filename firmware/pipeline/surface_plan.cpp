@@ -26,9 +26,9 @@ constexpr int kSmallestSidePx = 160;
 constexpr double kScaleStep = 0.75;
 // The first round of stereo works at half the size of the maps, but not below this side.
 constexpr double kSmallestFirstRoundSidePx = 640.0;
-// Voxels and extraction of the surface when no limit asks for less.
-constexpr std::size_t kVoxelBudget = std::size_t{1200} << 20U;
-constexpr std::size_t kSmallestVoxelBudget = std::size_t{64} << 20U;
+// Voxels of a tile and mesh of the surface when no limit asks for less.
+constexpr std::size_t kSurfaceBudget = std::size_t{1200} << 20U;
+constexpr std::size_t kSmallestSurfaceBudget = std::size_t{64} << 20U;
 
 struct PresetSizes {
   double map_scale;
@@ -189,7 +189,7 @@ Result<SurfacePlan> plan_surface(std::span<const DenseView> views,
           : wanted_scale(views, options.preset);
   plan.surface.max_faces = options.max_faces > 0 ? static_cast<std::size_t>(options.max_faces)
                                                  : sizes_of(options.preset).max_faces;
-  plan.surface.max_memory_bytes = kVoxelBudget;
+  plan.surface.max_memory_bytes = kSurfaceBudget;
   plan.texture.atlas.page_size_px = options.texture_size_px;
   if (limit_bytes != 0 && options.preset != QualityPreset::kPreview) {
     TM_RETURN_IF_ERROR(shrink_maps(views, limit_bytes, plan));
@@ -199,9 +199,11 @@ Result<SurfacePlan> plan_surface(std::span<const DenseView> views,
     return plan;
   }
   if (options.last_stage >= LastStage::kMesh && mesh_bytes(plan) > limit_bytes) {
-    // The surface stage makes its voxels larger until they fit, and says so.
+    // The surface stage works in smaller tiles; it makes its voxels larger only when the mesh
+    // itself would not fit, and says so.
     const std::uint64_t left = limit_bytes > kBaseBytes ? limit_bytes - kBaseBytes : 0;
-    plan.surface.max_memory_bytes = std::max(kSmallestVoxelBudget, static_cast<std::size_t>(left));
+    plan.surface.max_memory_bytes =
+        std::max(kSmallestSurfaceBudget, static_cast<std::size_t>(left));
     if (mesh_bytes(plan) > limit_bytes) {
       return fail(
           ErrorCode::kLimitExceeded,

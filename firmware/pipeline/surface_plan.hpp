@@ -32,9 +32,10 @@ struct SurfacePlan {
   std::vector<std::string> lowered;  ///< one sentence for each quality setting that was lowered
 };
 
-/// Settings of a preset for these views; smaller depth maps, then coarser voxels and smaller
-/// texture pages, as far as `limit_bytes` (0: no limit) asks for. The result does not depend on the
-/// number of threads. kLimitExceeded when even the lowest settings need more.
+/// Settings of a preset for these views; smaller depth maps, then smaller tiles of voxels
+/// (coarser voxels when the mesh itself would not fit) and smaller texture pages, as far as
+/// `limit_bytes` (0: no limit) asks for. The result does not depend on the number of threads.
+/// kLimitExceeded when even the lowest settings need more.
 [[nodiscard]] Result<SurfacePlan> plan_surface(std::span<const DenseView> views,
                                                const BuildOptions& options,
                                                std::uint64_t limit_bytes);

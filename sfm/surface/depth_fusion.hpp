@@ -7,7 +7,7 @@
 #include "sfm/dense/dense_view.hpp"
 #include "sfm/dense/depth_map.hpp"
 #include "sfm/surface/surface_options.hpp"
-#include "sfm/surface/voxel_grid.hpp"
+#include "sfm/surface/triangle_mesh.hpp"
 
 namespace trigmesh {
 
@@ -17,12 +17,14 @@ namespace trigmesh {
                                                const DepthMapSource& depth_maps,
                                                const SurfaceOptions& options);
 
-/// All depth maps in one distance function. Loads one map at a time (twice); fills in the report's
-/// voxel size, memory and view fields. kInsufficientData: no depth anywhere; errors of the source.
-[[nodiscard]] Result<VoxelGrid> fuse_depth_maps(std::span<const DenseView> views,
-                                                const DepthMapSource& depth_maps,
-                                                const SurfaceOptions& options,
-                                                SurfaceReport& report,
-                                                Executor& executor);
+/// The zero level of one distance function of all depth maps, with normals and without colours.
+/// Space is worked on in tiles: voxels of one tile at a time, each from the maps that reach it,
+/// loaded one by one in order. The result does not depend on the tiles. Fills in the report's voxel
+/// size, memory, tile and view fields. kInsufficientData: no depth anywhere; errors of the source.
+[[nodiscard]] Result<TriangleMesh> fuse_depth_maps(std::span<const DenseView> views,
+                                                   const DepthMapSource& depth_maps,
+                                                   const SurfaceOptions& options,
+                                                   SurfaceReport& report,
+                                                   Executor& executor);
 
 }  // namespace trigmesh

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <utility>
 
 #include "sfm/surface/hole_patch.hpp"
@@ -48,8 +49,9 @@ struct BorderNeighbors {
 
 using Edge = std::pair<std::uint32_t, std::uint32_t>;
 
-/// Edges of the mesh, to see whether a patch would use one a third time.
-std::vector<Edge> sorted_edges_of(const TriangleMesh& mesh, const std::vector<std::uint8_t>& on_border) {
+/// Edges of the mesh between border vertices.
+std::vector<Edge> sorted_edges_of(const TriangleMesh& mesh,
+                                  const std::vector<std::uint8_t>& on_border) {
   std::vector<Edge> edges;
   for (const auto& face : mesh.faces) {
     for (std::size_t k = 0; k < 3; ++k) {
@@ -64,26 +66,39 @@ std::vector<Edge> sorted_edges_of(const TriangleMesh& mesh, const std::vector<st
   return edges;
 }
 
-/// Whether an inner edge of the patch between two border vertices exists in the mesh already.
-bool collides(const HolePatch& patch, const BoundaryLoop& loop, const std::vector<Edge>& edges) {
+/// The edges of a patch, in vertices of the mesh, that run between border vertices across the hole.
+std::vector<Edge> spanning_edges(const HolePatch& patch, const BoundaryLoop& loop) {
   const auto n = static_cast<std::uint32_t>(patch.border_count);
+  std::vector<Edge> spanning;
   for (const auto& face : patch.faces) {
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t a = face[k];
       const std::uint32_t b = face[(k + 1) % 3];
       const bool border_edge = a < n && b < n && ((a + 1) % n == b || (b + 1) % n == a);
-      if (a < n && b < n && !border_edge &&
-          std::binary_search(edges.begin(),
-                             edges.end(),
-                             Edge(std::min(loop[a], loop[b]), std::max(loop[a], loop[b])))) {
-        return true;
+      if (a < n && b < n && !border_edge) {
+        spanning.emplace_back(std::min(loop[a], loop[b]), std::max(loop[a], loop[b]));
       }
     }
   }
-  return false;
+  return spanning;
 }
 
-std::array<std::uint8_t, 3> mean_color(const TriangleMesh& mesh, const std::array<std::uint32_t, 3>& of) {
+/// Edges between border vertices that a patch must not use again: those of the mesh, and those of
+/// the patches that were put in (holes that touch in two vertices may want the same).
+struct TakenEdges {
+  std::vector<Edge> of_mesh;  ///< sorted
+  std::set<Edge> of_patches;
+
+  [[nodiscard]] bool contain_any(const std::vector<Edge>& edges) const {
+    return std::any_of(edges.begin(), edges.end(), [&](const Edge& edge) {
+      return of_patches.count(edge) != 0 ||
+             std::binary_search(of_mesh.begin(), of_mesh.end(), edge);
+    });
+  }
+};
+
+std::array<std::uint8_t, 3> mean_color(const TriangleMesh& mesh,
+                                       const std::array<std::uint32_t, 3>& of) {
   std::array<std::uint8_t, 3> mean{};
   for (std::size_t c = 0; c < 3; ++c) {
     const int sum = mesh.colors[of[0]][c] + mesh.colors[of[1]][c] + mesh.colors[of[2]][c];
@@ -126,7 +141,7 @@ FilledHoles fill_holes(float max_diameter, float edge_length, TriangleMesh& mesh
       on_border[v] = 1;
     }
   }
-  const std::vector<Edge> edges = sorted_edges_of(mesh, on_border);
+  TakenEdges taken{sorted_edges_of(mesh, on_border), {}};
   FilledHoles result;
   for (const BoundaryLoop& loop : loops) {
     const SurfaceHole hole = describe(loop, mesh);
@@ -142,10 +157,12 @@ FilledHoles fill_holes(float max_diameter, float edge_length, TriangleMesh& mesh
     }
     HolePatch patch = minimal_area_patch(border);
     refine(edge_length, patch);
-    if (collides(patch, loop, edges)) {
+    const std::vector<Edge> spanning = spanning_edges(patch, loop);
+    if (taken.contain_any(spanning)) {
       result.open.push_back(hole);
       continue;
     }
+    taken.of_patches.insert(spanning.begin(), spanning.end());
     fair(anchors, patch);
     append(patch, loop, mesh);
     ++result.filled_count;

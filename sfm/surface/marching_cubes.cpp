@@ -4,23 +4,28 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 
+#include "firmware/base/check.hpp"
 #include "sfm/surface/cell_triangles.hpp"
 
 namespace trigmesh {
 
 namespace {
 
-constexpr std::uint32_t kNoVertex = 0xFFFFFFFFU;
 // Vertices keep this distance from the ends of their edge: no two fall together.
 constexpr float kEndMargin = 0.02F;
 constexpr float kUnknown = 2.0F;  // distances are at most 1
 // A block with one layer before it and two behind it: what gradients at its far corners need.
 constexpr int kPaddedEdge = kBlockEdge + 3;
-// A block with the first layer of the next ones.
-constexpr int kCornerEdge = kBlockEdge + 1;
+// A face names the edges of its vertices: 3 * voxel + axis, and above these bits which of the eight
+// blocks the edge starts in: bit 0, 1, 2 = the next one along x, y, z.
+constexpr int kEdgeBits = 11;
+constexpr std::uint16_t kEdgeMask = (1U << kEdgeBits) - 1U;
+static_assert(3 * kBlockVoxels <= std::size_t{1} << kEdgeBits);
 
-using PaddedBlock = std::array<float, static_cast<std::size_t>(kPaddedEdge* kPaddedEdge* kPaddedEdge)>;
+using PaddedBlock =
+    std::array<float, static_cast<std::size_t>(kPaddedEdge* kPaddedEdge* kPaddedEdge)>;
 
 std::size_t padded_index(int x, int y, int z) {
   return static_cast<std::size_t>(((z + 1) * kPaddedEdge + y + 1) * kPaddedEdge + x + 1);
@@ -49,10 +54,8 @@ void load_padded(const VoxelGrid& grid,
       for (int x = -1; x <= kBlockEdge + 1; ++x) {
         const VoxelPlace place = place_of(x, y, z);
         const std::size_t block = around[place.neighbor];
-        const bool known =
-            block != VoxelGrid::kNone && grid.block(block).weight[place.voxel] >= min_weight;
-        padded[padded_index(x, y, z)] =
-            known ? grid.block(block).distance[place.voxel] : kUnknown;
+        const bool known = block != kNoBlock && grid.block(block).weight[place.voxel] >= min_weight;
+        padded[padded_index(x, y, z)] = known ? grid.block(block).distance[place.voxel] : kUnknown;
       }
     }
   }
@@ -83,14 +86,6 @@ Eigen::Vector3f gradient_at(const PaddedBlock& padded, int x, int y, int z) {
   return gradient;
 }
 
-/// What one block contributes.
-struct BlockSurface {
-  std::vector<std::uint16_t> edges;  ///< 3 * voxel + axis of each vertex, rising
-  std::vector<Eigen::Vector3f> positions;
-  std::vector<Eigen::Vector3f> normals;
-  std::vector<std::array<std::uint32_t, 3>> faces;  ///< vertices of the whole mesh
-};
-
 /// A vertex on each voxel edge of the block that the surface crosses.
 void find_vertices(const PaddedBlock& padded,
                    const Eigen::Vector3f& corner,
@@ -102,8 +97,7 @@ void find_vertices(const PaddedBlock& padded,
       for (int x = 0; x < kBlockEdge; ++x, ++voxel) {
         const float here = padded[padded_index(x, y, z)];
         for (int axis = 0; axis < 3 && is_known(here); ++axis) {
-          const Eigen::Vector3i to =
-              Eigen::Vector3i(x, y, z) + Eigen::Vector3i::Unit(axis);
+          const Eigen::Vector3i to = Eigen::Vector3i(x, y, z) + Eigen::Vector3i::Unit(axis);
           const float there = padded[padded_index(to.x(), to.y(), to.z())];
           if (!is_known(there) || (here < 0.0F) == (there < 0.0F)) {
             continue;
@@ -113,7 +107,8 @@ void find_vertices(const PaddedBlock& padded,
                                            t * gradient_at(padded, to.x(), to.y(), to.z());
           const Eigen::Vector3f in_voxels =
               Eigen::Vector3i(x, y, z).cast<float>() + t * Eigen::Vector3f::Unit(axis);
-          surface.edges.push_back(static_cast<std::uint16_t>(3 * voxel + static_cast<std::size_t>(axis)));
+          surface.edges.push_back(
+              static_cast<std::uint16_t>(3 * voxel + static_cast<std::size_t>(axis)));
           surface.positions.emplace_back(corner + in_voxels * voxel_size);
           surface.normals.emplace_back(gradient.norm() > 0.0F ? gradient.normalized()
                                                               : Eigen::Vector3f::UnitZ());
@@ -123,37 +118,15 @@ void find_vertices(const PaddedBlock& padded,
   }
 }
 
-/// Vertex numbers on the edges that start at the corners of the cells of a block.
-using CornerEdges =
-    std::array<std::uint32_t, static_cast<std::size_t>(3 * kCornerEdge* kCornerEdge* kCornerEdge)>;
-
-std::size_t corner_edge_index(int x, int y, int z, int axis) {
-  return static_cast<std::size_t>(((z * kCornerEdge + y) * kCornerEdge + x) * 3 + axis);
-}
-
-void number_edges(const std::vector<BlockSurface>& surfaces,
-                  const std::vector<std::uint32_t>& first_vertex,
-                  const std::array<std::size_t, 27>& around,
-                  CornerEdges& numbers) {
-  numbers.fill(kNoVertex);
-  for (int shift = 0; shift < 8; ++shift) {
-    const Eigen::Vector3i offset(shift & 1, (shift >> 1) & 1, (shift >> 2) & 1);
-    const std::size_t block =
-        around[static_cast<std::size_t>(13 + offset.x() + 3 * offset.y() + 9 * offset.z())];
-    if (block == VoxelGrid::kNone) {
-      continue;
-    }
-    for (std::size_t k = 0; k < surfaces[block].edges.size(); ++k) {
-      const int edge = surfaces[block].edges[k];
-      const int voxel = edge / 3;
-      const Eigen::Vector3i at =
-          Eigen::Vector3i(voxel % 8, voxel / 8 % 8, voxel / 64) + kBlockEdge * offset;
-      if (at.maxCoeff() < kCornerEdge) {
-        numbers[corner_edge_index(at.x(), at.y(), at.z(), edge % 3)] =
-            first_vertex[block] + static_cast<std::uint32_t>(k);
-      }
-    }
-  }
+/// The name of an edge of the cell (x, y, z) of a block.
+std::uint16_t name_of(const CellEdge& edge, int x, int y, int z) {
+  const Eigen::Vector3i at(
+      x + (edge.from & 1), y + ((edge.from >> 1) & 1), z + ((edge.from >> 2) & 1));
+  const Eigen::Vector3i shift = at / kBlockEdge;
+  const Eigen::Vector3i within = at - kBlockEdge * shift;
+  const int voxel = within.x() + kBlockEdge * (within.y() + kBlockEdge * within.z());
+  const int block = shift.x() + 2 * shift.y() + 4 * shift.z();
+  return static_cast<std::uint16_t>((block << kEdgeBits) | (3 * voxel + edge.axis));
 }
 
 /// Which corners of a cell are inside; nothing (0) when one of them is unknown.
@@ -169,74 +142,108 @@ std::uint8_t inside_corners(const PaddedBlock& padded, int x, int y, int z) {
   return inside;
 }
 
-void find_faces(const PaddedBlock& padded, const CornerEdges& numbers, BlockSurface& surface) {
+void find_faces(const PaddedBlock& padded, BlockSurface& surface) {
   for (int z = 0; z < kBlockEdge; ++z) {
     for (int y = 0; y < kBlockEdge; ++y) {
       for (int x = 0; x < kBlockEdge; ++x) {
         for (const CellTriangle& triangle : cell_triangles(inside_corners(padded, x, y, z))) {
-          std::array<std::uint32_t, 3> face{};
-          for (std::size_t k = 0; k < 3; ++k) {
-            const CellEdge edge = cell_edge(triangle[k]);
-            face[k] = numbers[corner_edge_index(x + (edge.from & 1),
-                                                y + ((edge.from >> 1) & 1),
-                                                z + (edge.from >> 2),
-                                                edge.axis)];
-          }
-          surface.faces.push_back(face);
+          surface.faces.push_back({name_of(cell_edge(triangle[0]), x, y, z),
+                                   name_of(cell_edge(triangle[1]), x, y, z),
+                                   name_of(cell_edge(triangle[2]), x, y, z)});
         }
       }
     }
   }
 }
 
-/// Concatenates the blocks in order, giving each block's memory back.
-TriangleMesh join(std::vector<BlockSurface>& surfaces) {
-  std::size_t vertices = 0;
-  std::size_t faces = 0;
-  for (const BlockSurface& surface : surfaces) {
-    vertices += surface.positions.size();
-    faces += surface.faces.size();
+/// Number of the first vertex and face of each block, and behind the last.
+struct FirstNumbers {
+  std::vector<std::uint32_t> vertex{0};
+  std::vector<std::size_t> face{0};
+
+  explicit FirstNumbers(std::span<const BlockSurface> surfaces) {
+    for (const BlockSurface& surface : surfaces) {
+      vertex.push_back(vertex.back() + static_cast<std::uint32_t>(surface.edges.size()));
+      face.push_back(face.back() + surface.faces.size());
+    }
   }
-  TriangleMesh mesh;
-  mesh.positions.reserve(vertices);
-  mesh.normals.reserve(vertices);
-  mesh.faces.reserve(faces);
+};
+
+/// The faces of a block with vertices of the whole mesh: welded by the integer names of their
+/// edges.
+void number_faces(std::span<const BlockKey> keys,
+                  std::span<const BlockSurface> surfaces,
+                  const FirstNumbers& first,
+                  std::size_t block,
+                  TriangleMesh& mesh) {
+  const std::array<std::size_t, 27> around = blocks_around(keys, keys[block]);
+  const auto number_of = [&](std::uint16_t name) {
+    const int shift = name >> kEdgeBits;
+    const std::size_t owner = around[static_cast<std::size_t>(
+        13 + (shift & 1) + 3 * ((shift >> 1) & 1) + 9 * (shift >> 2))];
+    TM_CHECK(owner != kNoBlock);
+    const std::vector<std::uint16_t>& edges = surfaces[owner].edges;
+    const auto edge = static_cast<std::uint16_t>(name & kEdgeMask);
+    const auto place = std::lower_bound(edges.begin(), edges.end(), edge);
+    TM_CHECK(place != edges.end() && *place == edge);
+    return first.vertex[owner] + static_cast<std::uint32_t>(place - edges.begin());
+  };
+  for (std::size_t f = 0; f < surfaces[block].faces.size(); ++f) {
+    const auto& face = surfaces[block].faces[f];
+    mesh.faces[first.face[block] + f] = {
+        number_of(face[0]), number_of(face[1]), number_of(face[2])};
+  }
+}
+
+/// Moves one kind of items of all blocks into one list, giving the blocks' memory back.
+template <typename T>
+std::vector<T> take_all(std::vector<T> BlockSurface::*part,
+                        std::size_t count,
+                        std::span<BlockSurface> surfaces) {
+  std::vector<T> all;
+  all.reserve(count);
   for (BlockSurface& surface : surfaces) {
-    mesh.positions.insert(mesh.positions.end(), surface.positions.begin(), surface.positions.end());
-    mesh.normals.insert(mesh.normals.end(), surface.normals.begin(), surface.normals.end());
-    mesh.faces.insert(mesh.faces.end(), surface.faces.begin(), surface.faces.end());
-    surface = BlockSurface();
+    all.insert(all.end(), (surface.*part).begin(), (surface.*part).end());
+    surface.*part = {};
   }
-  return mesh;
+  return all;
 }
 
 }  // namespace
 
+BlockSurface extract_block(const VoxelGrid& grid, std::size_t block, float min_weight) {
+  const auto voxel_size = static_cast<float>(grid.voxel_size());
+  PaddedBlock padded;
+  load_padded(grid, blocks_around(grid.keys(), grid.key(block)), min_weight, padded);
+  const Eigen::Vector3f corner =
+      block_position(grid.key(block)).cast<float>() * (voxel_size * static_cast<float>(kBlockEdge));
+  BlockSurface surface;
+  find_vertices(padded, corner, voxel_size, surface);
+  find_faces(padded, surface);
+  surface.shrink();
+  return surface;
+}
+
+TriangleMesh join_blocks(std::span<const BlockKey> keys,
+                         std::vector<BlockSurface> surfaces,
+                         Executor& executor) {
+  TM_CHECK(keys.size() == surfaces.size());
+  const FirstNumbers first(surfaces);
+  TriangleMesh mesh;
+  mesh.positions = take_all(&BlockSurface::positions, first.vertex.back(), surfaces);
+  mesh.normals = take_all(&BlockSurface::normals, first.vertex.back(), surfaces);
+  mesh.faces.resize(first.face.back());
+  executor.for_each_index(
+      keys.size(), [&](std::size_t block) { number_faces(keys, surfaces, first, block, mesh); });
+  return mesh;
+}
+
 TriangleMesh extract_surface(const VoxelGrid& grid, float min_weight, Executor& executor) {
   std::vector<BlockSurface> surfaces(grid.size());
-  const auto voxel_size = static_cast<float>(grid.voxel_size());
   executor.for_each_index(grid.size(), [&](std::size_t block) {
-    PaddedBlock padded;
-    load_padded(grid, grid.neighborhood(block), min_weight, padded);
-    const Eigen::Vector3f corner = block_position(grid.key(block)).cast<float>() *
-                                   (voxel_size * static_cast<float>(kBlockEdge));
-    find_vertices(padded, corner, voxel_size, surfaces[block]);
+    surfaces[block] = extract_block(grid, block, min_weight);
   });
-  std::vector<std::uint32_t> first_vertex(grid.size());
-  std::uint32_t count = 0;
-  for (std::size_t block = 0; block < grid.size(); ++block) {
-    first_vertex[block] = count;
-    count += static_cast<std::uint32_t>(surfaces[block].positions.size());
-  }
-  executor.for_each_index(grid.size(), [&](std::size_t block) {
-    const std::array<std::size_t, 27> around = grid.neighborhood(block);
-    PaddedBlock padded;
-    load_padded(grid, around, min_weight, padded);
-    CornerEdges numbers;
-    number_edges(surfaces, first_vertex, around, numbers);
-    find_faces(padded, numbers, surfaces[block]);
-  });
-  return join(surfaces);
+  return join_blocks(grid.keys(), std::move(surfaces), executor);
 }
 
 }  // namespace trigmesh

@@ -13,7 +13,6 @@ namespace {
 constexpr float kShrink = 0.5F;
 constexpr float kGrow = -0.53F;
 
-
 /// Mean of the neighbours of each vertex, each weighted by its number of common faces.
 std::vector<Eigen::Vector3f> neighbor_means(const TriangleMesh& mesh) {
   std::vector<Eigen::Vector3f> sums(mesh.positions.size(), Eigen::Vector3f::Zero());
@@ -38,6 +37,18 @@ std::vector<std::uint8_t> border_vertices(const TriangleMesh& mesh) {
     }
   }
   return on_border;
+}
+
+/// The vertices of all borders, loop by loop.
+std::vector<Eigen::Vector3f> border_points(const std::vector<BoundaryLoop>& loops,
+                                           const TriangleMesh& mesh) {
+  std::vector<Eigen::Vector3f> points;
+  for (const BoundaryLoop& loop : loops) {
+    for (const std::uint32_t v : loop) {
+      points.push_back(mesh.positions[v]);
+    }
+  }
+  return points;
 }
 
 }  // namespace
@@ -92,6 +103,23 @@ std::size_t flatten_spikes(float max_height, TriangleMesh& mesh) {
     }
   }
   return count;
+}
+
+void smooth_borders(int passes, TriangleMesh& mesh) {
+  const std::vector<BoundaryLoop> loops = analyze_topology(mesh).boundary_loops;
+  for (int step = 0; step < 2 * passes; ++step) {
+    const float factor = step % 2 == 0 ? kShrink : kGrow;
+    const std::vector<Eigen::Vector3f> before = border_points(loops, mesh);
+    std::size_t i = 0;
+    for (const BoundaryLoop& loop : loops) {
+      const std::size_t first = i;
+      for (std::size_t k = 0; k < loop.size(); ++k, ++i) {
+        const Eigen::Vector3f& last = before[first + (k + loop.size() - 1) % loop.size()];
+        const Eigen::Vector3f& next = before[first + (k + 1) % loop.size()];
+        mesh.positions[loop[k]] = before[i] + factor * (0.5F * (last + next) - before[i]);
+      }
+    }
+  }
 }
 
 void smooth(int passes, TriangleMesh& mesh) {

@@ -30,4 +30,8 @@ std::size_t flatten_spikes(float max_height, TriangleMesh& mesh);
 /// fair surface design", SIGGRAPH 1995): noise goes, volume stays. Borders do not move.
 void smooth(int passes, TriangleMesh& mesh);
 
+/// The same along the borders of a two-manifold mesh, which marching cubes and missing support
+/// leave with teeth of a voxel: every tooth costs faces that simplification cannot take away.
+void smooth_borders(int passes, TriangleMesh& mesh);
+
 }  // namespace trigmesh

@@ -1,10 +1,12 @@
 #include "sfm/surface/mesh_simplification.hpp"
 
-#include <meshoptimizer.h>
-
+#include <utility>
 #include <vector>
 
-#include "sfm/surface/mesh_topology.hpp"
+#include <meshoptimizer.h>
+
+#include "sfm/surface/mesh_fitting.hpp"
+#include "sfm/surface/mesh_repair.hpp"
 
 namespace trigmesh {
 
@@ -25,7 +27,8 @@ double simplify(std::size_t max_faces, TriangleMesh& mesh) {
     indices.insert(indices.end(), face.begin(), face.end());
   }
   const float* positions = mesh.positions.front().data();
-  const float extent = meshopt_simplifyScale(positions, mesh.positions.size(), sizeof(Eigen::Vector3f));
+  const float extent =
+      meshopt_simplifyScale(positions, mesh.positions.size(), sizeof(Eigen::Vector3f));
   float error = 0.0F;
   const std::size_t count = meshopt_simplify(indices.data(),
                                              indices.data(),
@@ -37,11 +40,14 @@ double simplify(std::size_t max_faces, TriangleMesh& mesh) {
                                              kMaxErrorRatio,
                                              0,
                                              &error);
+  const std::vector<std::array<std::uint32_t, 3>> fine_faces = std::move(mesh.faces);
   mesh.faces.resize(count / 3);
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
     mesh.faces[f] = {indices[3 * f], indices[3 * f + 1], indices[3 * f + 2]};
   }
-  keep_faces(std::vector<std::uint8_t>(mesh.faces.size(), 1), mesh);
+  fit_to_fine_surface(fine_faces, mesh);
+  // Collapses fold thin parts together; meshoptimizer does not look for that.
+  make_two_manifold(mesh);
   return static_cast<double>(error) * static_cast<double>(extent);
 }
 

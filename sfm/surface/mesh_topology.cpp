@@ -1,6 +1,7 @@
 #include "sfm/surface/mesh_topology.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 #include <Eigen/Geometry>
@@ -15,8 +16,8 @@ constexpr std::uint32_t kNone = 0xFFFFFFFFU;
 
 /// An edge as a face runs along it.
 struct DirectedEdge {
-  std::uint64_t key = 0;   ///< smaller vertex << 32 | larger vertex
-  bool falling = false;    ///< runs from the larger to the smaller vertex
+  std::uint64_t key = 0;  ///< smaller vertex << 32 | larger vertex
+  bool falling = false;   ///< runs from the larger to the smaller vertex
 
   auto operator<=>(const DirectedEdge&) const = default;
 };
@@ -86,7 +87,9 @@ Eigen::Vector3f scaled_normal(const TriangleMesh& mesh, const std::array<std::ui
 }
 
 template <typename T>
-void move_kept(const std::vector<std::uint32_t>& new_index, std::size_t count, std::vector<T>& values) {
+void move_kept(const std::vector<std::uint32_t>& new_index,
+               std::size_t count,
+               std::vector<T>& values) {
   if (values.empty()) {
     return;
   }
@@ -184,9 +187,16 @@ void keep_faces(const std::vector<std::uint8_t>& keep, TriangleMesh& mesh) {
 std::vector<Eigen::Vector3f> vertex_normals(const TriangleMesh& mesh) {
   std::vector<Eigen::Vector3f> normals(mesh.positions.size(), Eigen::Vector3f::Zero());
   for (const auto& face : mesh.faces) {
-    const Eigen::Vector3f normal = scaled_normal(mesh, face);
-    for (const std::uint32_t v : face) {
-      normals[v] += normal;
+    const Eigen::Vector3f scaled = scaled_normal(mesh, face);
+    const float length = scaled.norm();
+    if (!(length > 0.0F)) {
+      continue;
+    }
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Eigen::Vector3f& tip = mesh.positions[face[k]];
+      const Eigen::Vector3f one = mesh.positions[face[(k + 1) % 3]] - tip;
+      const Eigen::Vector3f other = mesh.positions[face[(k + 2) % 3]] - tip;
+      normals[face[k]] += std::atan2(length, one.dot(other)) / length * scaled;
     }
   }
   for (Eigen::Vector3f& normal : normals) {

@@ -7,8 +7,8 @@
 #include "sfm/surface/depth_frame.hpp"
 #include "sfm/surface/depth_fusion.hpp"
 #include "sfm/surface/hole_filling.hpp"
-#include "sfm/surface/marching_cubes.hpp"
 #include "sfm/surface/mesh_cleaning.hpp"
+#include "sfm/surface/mesh_repair.hpp"
 #include "sfm/surface/mesh_simplification.hpp"
 #include "sfm/surface/mesh_topology.hpp"
 #include "sfm/surface/vertex_votes.hpp"
@@ -21,20 +21,7 @@ namespace {
 constexpr double kSupportVoxels = 1.5;
 // Neighbouring vertices are about one voxel apart: what stands out by this much is no surface.
 constexpr double kSpikeVoxels = 0.9;
-
-/// Lends the voxels for as long as the surface is extracted.
-Result<TriangleMesh> extract(std::span<const DenseView> views,
-                             const DepthMapSource& depth_maps,
-                             const SurfaceOptions& options,
-                             SurfaceReport& report,
-                             Executor& executor) {
-  TM_ASSIGN_OR_RETURN(const VoxelGrid grid,
-                      fuse_depth_maps(views, depth_maps, options, report, executor));
-  TriangleMesh mesh =
-      extract_surface(grid, static_cast<float>(options.min_voxel_weight), executor);
-  report.extracted_faces = mesh.faces.size();
-  return mesh;
-}
+constexpr int kBorderPasses = 10;
 
 /// What the views say about a mesh: support and colour of its vertices.
 Result<VertexVotes> ask_views(const SurfaceInput& input,
@@ -45,12 +32,12 @@ Result<VertexVotes> ask_views(const SurfaceInput& input,
   VertexVotes votes(mesh.positions.size());
   for (std::size_t view = 0; view < input.views.size(); ++view) {
     TM_ASSIGN_OR_RETURN(const DepthMap map, input.depth_maps->load(view));
-    TM_ASSIGN_OR_RETURN(
-        const DepthFrame frame,
-        make_depth_frame(map,
-                         input.views[view].cam_from_world,
-                         {.voxel_size = static_cast<float>(voxel_size),
-                          .max_footprint_voxels = static_cast<float>(options.max_footprint_voxels)}));
+    TM_ASSIGN_OR_RETURN(const DepthFrame frame,
+                        make_depth_frame(map,
+                                         input.views[view].cam_from_world,
+                                         {.voxel_size = static_cast<float>(voxel_size),
+                                          .max_footprint_voxels =
+                                              static_cast<float>(options.max_footprint_voxels)}));
     if (frame.planes.empty()) {
       continue;
     }
@@ -58,6 +45,20 @@ Result<VertexVotes> ask_views(const SurfaceInput& input,
     votes.add_view(frame, image, mesh, static_cast<float>(kSupportVoxels * voxel_size), executor);
   }
   return votes;
+}
+
+/// Colours the vertices and returns how many views agree with each. The normals of the distance
+/// function have served then, and go: memory is scarcest while the whole mesh is cleaned.
+Result<std::vector<std::uint16_t>> color_and_count(const SurfaceInput& input,
+                                                   const SurfaceOptions& options,
+                                                   double voxel_size,
+                                                   TriangleMesh& mesh,
+                                                   Executor& executor) {
+  TM_ASSIGN_OR_RETURN(const VertexVotes votes,
+                      ask_views(input, options, voxel_size, mesh, executor));
+  mesh.colors = votes.colors();
+  mesh.normals = {};
+  return votes.support();
 }
 
 void clean(const SurfaceOptions& options,
@@ -89,17 +90,19 @@ Result<SurfaceResult> make_surface(const SurfaceInput& input,
   TM_RETURN_IF_ERROR(options.validate());
   SurfaceReport report;
   TM_ASSIGN_OR_RETURN(TriangleMesh mesh,
-                      extract(input.views, *input.depth_maps, options, report, executor));
-  TM_ASSIGN_OR_RETURN(const VertexVotes votes,
-                      ask_views(input, options, report.voxel_size, mesh, executor));
-  mesh.colors = votes.colors();
-  clean(options, votes.support(), mesh, report);
+                      fuse_depth_maps(input.views, *input.depth_maps, options, report, executor));
+  report.extracted_faces = mesh.faces.size();
+  TM_ASSIGN_OR_RETURN(const std::vector<std::uint16_t> support,
+                      color_and_count(input, options, report.voxel_size, mesh, executor));
+  clean(options, support, mesh, report);
   if (mesh.faces.empty()) {
     return fail(ErrorCode::kInsufficientData,
                 "cannot make a surface: nothing is left of {} faces that {} views gave",
                 report.extracted_faces,
                 report.view_count);
   }
+  make_two_manifold(mesh);
+  smooth_borders(kBorderPasses, mesh);
   report.faces_before_simplification = mesh.faces.size();
   report.simplification_error = simplify(options.max_faces, mesh);
   mesh.normals = vertex_normals(mesh);

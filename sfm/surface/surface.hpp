@@ -19,8 +19,8 @@ struct SurfaceInput {
 };
 
 /// Makes one coloured triangle surface from the depth maps of all views: distance function -> zero
-/// level -> what enough views support -> components, holes -> budget of faces. Depth maps and images
-/// are loaded one view at a time. The same input gives the same bytes with any executor.
+/// level -> what enough views support -> components, holes -> budget of faces. Depth maps and
+/// images are loaded one view at a time. The same input gives the same bytes with any executor.
 /// kInvalidArgument: options or maps that contradict themselves; kInsufficientData: no depth
 /// anywhere, or no surface was left; errors of the sources.
 [[nodiscard]] Result<SurfaceResult> make_surface(const SurfaceInput& input,

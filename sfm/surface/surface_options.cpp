@@ -7,13 +7,17 @@ namespace trigmesh {
 namespace {
 
 constexpr std::size_t kMinMemoryBytes = std::size_t{4} << 20U;
+constexpr std::size_t kMinTileBytes = std::size_t{2} << 20U;
 
 }  // namespace
 
 Result<> SurfaceOptions::validate() const {
   const auto refuse = [](const char* name, double value, const char* rule) {
-    return fail(
-        ErrorCode::kInvalidArgument, "surface option {} is {}: it must be in {}", name, value, rule);
+    return fail(ErrorCode::kInvalidArgument,
+                "surface option {} is {}: it must be in {}",
+                name,
+                value,
+                rule);
   };
   if (!(voxel_size >= 0.0 && std::isfinite(voxel_size))) {
     return refuse("voxel_size", voxel_size, "[0, inf)");
@@ -50,6 +54,9 @@ Result<> SurfaceOptions::validate() const {
   }
   if (max_memory_bytes < kMinMemoryBytes) {
     return refuse("max_memory_bytes", static_cast<double>(max_memory_bytes), "[4 MiB, ...]");
+  }
+  if (max_tile_bytes < kMinTileBytes) {
+    return refuse("max_tile_bytes", static_cast<double>(max_tile_bytes), "[2 MiB, ...]");
   }
   return {};
 }

@@ -11,7 +11,8 @@
 
 namespace trigmesh {
 
-/// How depth maps become a surface. Lengths "in voxels" are multiples of the voxel edge that is used.
+/// How depth maps become a surface. Lengths "in voxels" are multiples of the voxel edge that is
+/// used.
 struct SurfaceOptions {
   /// Edge of a voxel in scene units; 0 = `voxel_footprint_ratio` times the median pixel footprint
   /// (depth / focal length) of the depth maps. [0, inf).
@@ -37,15 +38,20 @@ struct SurfaceOptions {
   int smoothing_passes = 1;
   /// Budget of faces; > 0.
   std::size_t max_faces = 700'000;
-  /// Above this many bytes for voxels and extraction the voxel is made larger in steps of
-  /// `kVoxelGrowthRatio`; at least 4 MiB.
+  /// Bytes for voxels and mesh, at least 4 MiB. Voxels are worked on in tiles that fit; only when
+  /// the mesh itself would not fit the voxel is made larger in steps of `kVoxelGrowthRatio`. What
+  /// it does not hold: one depth map and picture, and the budget of faces that simplification
+  /// leaves.
   std::size_t max_memory_bytes = std::size_t{640} << 20U;
+  /// Bytes for the voxels of one tile, at least 2 MiB; the result does not depend on it. Each tile
+  /// loads the depth maps that reach it again.
+  std::size_t max_tile_bytes = std::size_t{512} << 20U;
 
   /// kInvalidArgument: names the field, its value and the rule.
   [[nodiscard]] Result<> validate() const;
 };
 
-/// One declared step towards less memory: voxels this much larger, memory about halved.
+/// One declared step towards less memory: voxels this much larger, faces about halved.
 inline constexpr double kVoxelGrowthRatio = 1.4142135623730951;
 
 /// A hole that was left open.
@@ -58,10 +64,11 @@ struct SurfaceHole {
 
 /// What was done.
 struct SurfaceReport {
-  double voxel_size = 0.0;            ///< scene units
-  double wanted_voxel_size = 0.0;     ///< before the memory budget was looked at
-  int memory_steps = 0;               ///< how often the voxel was made larger to keep the budget
-  std::size_t grid_bytes = 0;         ///< of the voxels
+  double voxel_size = 0.0;         ///< scene units
+  double wanted_voxel_size = 0.0;  ///< before the memory budget was looked at
+  int memory_steps = 0;            ///< how often the voxel was made larger to keep the budget
+  std::size_t tile_count = 0;      ///< parts of space that were worked on one by one
+  std::size_t grid_bytes = 0;      ///< of the voxels of the largest tile
   std::size_t block_count = 0;
   std::size_t view_count = 0;         ///< views with a depth map
   std::size_t extracted_faces = 0;    ///< before cleaning
@@ -70,9 +77,9 @@ struct SurfaceReport {
   std::size_t removed_component_faces = 0;
   std::size_t filled_holes = 0;
   std::size_t faces_before_simplification = 0;
-  std::size_t non_manifold_edges = 0;  ///< of the result: edges with more than two faces
-  double simplification_error = 0.0;   ///< scene units; 0 = nothing was simplified
-  std::size_t open_hole_count = 0;     ///< all that were left open
+  std::size_t non_manifold_edges = 0;   ///< of the result; 0, else something is wrong
+  double simplification_error = 0.0;    ///< scene units; 0 = nothing was simplified
+  std::size_t open_hole_count = 0;      ///< all that were left open
   std::vector<SurfaceHole> open_holes;  ///< the largest `kMaxReportedHoles`, by falling perimeter
 };
 

@@ -11,9 +11,6 @@ namespace {
 
 // Pixels of a view that must touch a block before it counts as near a surface.
 constexpr std::size_t kMinTouches = 3;
-// Behind the surface the weight falls from one to zero over the truncation distance; along a
-// grazing ray nothing is said beyond this many truncation distances.
-constexpr float kMaxRayTruncations = 1.5F;
 // Coordinates beyond this many blocks do not fit a key.
 constexpr float kMaxBlocks = 1.0e6F;
 
@@ -38,9 +35,11 @@ PixelWindow window_of_ball(const DepthFrame& frame, const Eigen::Vector3f& cente
   const float near = center.z() - radius;
   const auto bounds = [&](float focal, float offset, float coordinate, int size) {
     const float low = focal * std::min((coordinate - radius) / near,
-                                       (coordinate - radius) / (center.z() + radius)) + offset;
+                                       (coordinate - radius) / (center.z() + radius)) +
+                      offset;
     const float high = focal * std::max((coordinate + radius) / near,
-                                        (coordinate + radius) / (center.z() + radius)) + offset;
+                                        (coordinate + radius) / (center.z() + radius)) +
+                       offset;
     const auto limit = static_cast<float>(size);
     return std::pair<int, int>(static_cast<int>(std::clamp(std::floor(low), 0.0F, limit)),
                                static_cast<int>(std::clamp(std::ceil(high), -1.0F, limit - 1.0F)));
@@ -61,8 +60,7 @@ bool may_see(const DepthFrame& frame, const Eigen::Vector3f& center, float radiu
   }
   const float nearest = center.z() - radius - reach;
   for (int y = window.first_y; y <= window.last_y; ++y) {
-    const PixelPlane* row =
-        frame.planes.data() + static_cast<std::ptrdiff_t>(y) * frame.width_px;
+    const PixelPlane* row = frame.planes.data() + static_cast<std::ptrdiff_t>(y) * frame.width_px;
     for (int x = window.first_x; x <= window.last_x; ++x) {
       if (row[x].depth > 0.0F && row[x].depth >= nearest) {
         return true;
@@ -81,8 +79,7 @@ struct Vote {
 inline Vote vote_of(const PixelPlane& plane,
                     const Eigen::Vector3f& point_in_cam,
                     const TsdfOptions& options) {
-  const float distance =
-      (plane.normal.dot(point_in_cam) - plane.offset) / options.truncation;
+  const float distance = (plane.normal.dot(point_in_cam) - plane.offset) / options.truncation;
   if (distance >= 1.0F) {
     const bool seen_through = point_in_cam.z() <= plane.free_depth - options.truncation;
     return {1.0F, seen_through ? plane.weight * options.free_space_weight_ratio : 0.0F};
@@ -90,8 +87,9 @@ inline Vote vote_of(const PixelPlane& plane,
   if (distance >= 0.0F) {
     return {distance, plane.weight};
   }
-  const bool hidden = distance <= -1.0F || point_in_cam.z() - plane.depth >
-                                               kMaxRayTruncations * options.truncation;
+  // Behind the surface the weight falls from one to zero over the truncation distance.
+  const bool hidden =
+      distance <= -1.0F || point_in_cam.z() - plane.depth > kMaxRayTruncations * options.truncation;
   return {distance, hidden ? 0.0F : plane.weight * (1.0F + distance)};
 }
 
@@ -116,7 +114,8 @@ std::vector<BlockKey> blocks_near_surface(const DepthFrame& frame,
                                  (y - frame.cy_px) / frame.fy_px * plane.depth,
                                  plane.depth);
     for (int s = 0; s < steps; ++s) {
-      const float along = reach * (2.0F * static_cast<float>(s) / static_cast<float>(steps - 1) - 1.0F);
+      const float along =
+          reach * (2.0F * static_cast<float>(s) / static_cast<float>(steps - 1) - 1.0F);
       const Eigen::Vector3f in_blocks =
           world_from_cam * (in_cam + along * plane.normal - frame.translation_cam_from_world) /
           block_size;
@@ -140,7 +139,10 @@ std::vector<BlockKey> blocks_near_surface(const DepthFrame& frame,
   return blocks;
 }
 
-void integrate(const DepthFrame& frame, const TsdfOptions& options, VoxelGrid& grid, std::size_t block) {
+void integrate(const DepthFrame& frame,
+               const TsdfOptions& options,
+               VoxelGrid& grid,
+               std::size_t block) {
   const auto voxel = static_cast<float>(grid.voxel_size());
   const Eigen::Vector3f corner =
       block_position(grid.key(block)).cast<float>() * (voxel * static_cast<float>(kBlockEdge));
@@ -156,8 +158,8 @@ void integrate(const DepthFrame& frame, const TsdfOptions& options, VoxelGrid& g
   std::size_t i = 0;
   for (int z = 0; z < kBlockEdge; ++z) {
     for (int y = 0; y < kBlockEdge; ++y) {
-      const Eigen::Vector3f row = corner_in_cam + step.col(1) * static_cast<float>(y) +
-                                  step.col(2) * static_cast<float>(z);
+      const Eigen::Vector3f row =
+          corner_in_cam + step.col(1) * static_cast<float>(y) + step.col(2) * static_cast<float>(z);
       for (int x = 0; x < kBlockEdge; ++x, ++i) {
         const Eigen::Vector3f point = row + step.col(0) * static_cast<float>(x);
         const PixelPlane* plane = frame.find_plane(point);

@@ -13,6 +13,9 @@ struct TsdfOptions {
   float free_space_weight_ratio = 0.3F;  ///< of "seen through" relative to "surface here"
 };
 
+/// Along a ray nothing is said beyond this many truncation distances behind the surface.
+inline constexpr float kMaxRayTruncations = 1.5F;
+
 /// Blocks within the truncation distance of the planes of a frame, sorted, each once; blocks that
 /// fewer than a few pixels touch are left out.
 [[nodiscard]] std::vector<BlockKey> blocks_near_surface(const DepthFrame& frame,
@@ -24,6 +27,9 @@ struct TsdfOptions {
 /// the pixel's plane in place of the distance along the ray, a weight that falls to zero behind the
 /// surface (as in Bylow et al., "Real-time camera tracking and 3D reconstruction using signed
 /// distance functions", RSS 2013) and a vote for empty space in front of it.
-void integrate(const DepthFrame& frame, const TsdfOptions& options, VoxelGrid& grid, std::size_t block);
+void integrate(const DepthFrame& frame,
+               const TsdfOptions& options,
+               VoxelGrid& grid,
+               std::size_t block);
 
 }  // namespace trigmesh

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -24,9 +25,21 @@ enum class BlockKey : std::uint64_t {};
 
 /// Signed distances of 8x8x8 voxels; voxel (x, y, z) is element x + 8 y + 64 z.
 struct VoxelBlock {
-  std::array<float, kBlockVoxels> distance{};  ///< mean, in truncation distances, [-1, 1], > 0 in front
-  std::array<float, kBlockVoxels> weight{};    ///< 0 = nobody said anything
+  std::array<float, kBlockVoxels>
+      distance{};  ///< mean, in truncation distances, [-1, 1], > 0 in front
+  std::array<float, kBlockVoxels> weight{};  ///< 0 = nobody said anything
 };
+
+inline constexpr std::size_t kNoBlock = std::numeric_limits<std::size_t>::max();
+
+/// Where a block stands in a sorted list of keys, or kNoBlock.
+[[nodiscard]] std::size_t find_block(std::span<const BlockKey> keys,
+                                     const Eigen::Vector3i& position);
+
+/// Where the 27 blocks around `center` stand in a sorted list, x fastest, itself in the middle; or
+/// kNoBlock.
+[[nodiscard]] std::array<std::size_t, 27> blocks_around(std::span<const BlockKey> keys,
+                                                        BlockKey center);
 
 /// A truncated signed distance function on those blocks of space that are near a surface: blocks in
 /// the order of their keys, found by bisection. Voxel (x, y, z) of block (i, j, k) stands at
@@ -36,20 +49,20 @@ class VoxelGrid {
   /// `keys` sorted, each once; `voxel_size` > 0.
   VoxelGrid(double voxel_size, std::vector<BlockKey> keys);
 
-  static constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
-
   [[nodiscard]] double voxel_size() const { return voxel_size_; }
-  [[nodiscard]] std::size_t size() const { return keys_.size(); }
-  [[nodiscard]] BlockKey key(std::size_t block) const { return keys_[block]; }
-  [[nodiscard]] VoxelBlock& block(std::size_t block) { return blocks_[block]; }
-  [[nodiscard]] const VoxelBlock& block(std::size_t block) const { return blocks_[block]; }
-  /// Index of a block, or kNone.
-  [[nodiscard]] std::size_t find(const Eigen::Vector3i& position) const;
-  /// Indices of the 27 blocks around `block`, x fastest, itself in the middle; or kNone.
-  [[nodiscard]] std::array<std::size_t, 27> neighborhood(std::size_t block) const;
 
-  /// What `block_count` blocks need here and while they become triangles.
-  [[nodiscard]] static std::size_t estimated_bytes(std::size_t block_count);
+  [[nodiscard]] std::size_t size() const { return keys_.size(); }
+
+  [[nodiscard]] const std::vector<BlockKey>& keys() const { return keys_; }
+
+  [[nodiscard]] BlockKey key(std::size_t block) const { return keys_[block]; }
+
+  [[nodiscard]] VoxelBlock& block(std::size_t block) { return blocks_[block]; }
+
+  [[nodiscard]] const VoxelBlock& block(std::size_t block) const { return blocks_[block]; }
+
+  /// What a block takes here.
+  static constexpr std::size_t kBytesPerBlock = sizeof(VoxelBlock) + sizeof(BlockKey);
 
  private:
   double voxel_size_;

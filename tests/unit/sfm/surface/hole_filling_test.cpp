@@ -53,5 +53,25 @@ TEST(HoleFilling, LeavesAndReportsALargeHole) {
   EXPECT_NEAR(holes.open[1].diameter, 17.0F, 1.0F);
 }
 
+TEST(HoleFilling, DoesNotUseAnEdgeTwiceWhereHolesTouchInTwoVertices) {
+  // Two diamonds at right angles with the short diagonal 0-1 in common, a fin on each border edge.
+  TriangleMesh mesh;
+  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0.5, 2, 0}, {0.5, -2, 0}, {0.5, 0, 2}, {0.5, 0, -2}};
+  const std::vector<BoundaryLoop> borders = {{0, 2, 1, 3}, {0, 4, 1, 5}};
+  for (const BoundaryLoop& border : borders) {
+    for (std::size_t k = 0; k < border.size(); ++k) {
+      const std::uint32_t from = border[k];
+      const std::uint32_t to = border[(k + 1) % border.size()];
+      const auto tip = static_cast<std::uint32_t>(mesh.positions.size());
+      mesh.positions.emplace_back(5.0F * (mesh.positions[from] + mesh.positions[to]) -
+                                  Eigen::Vector3f(4.5F, 0.0F, 0.0F));
+      mesh.faces.push_back({to, from, tip});
+    }
+  }
+  const FilledHoles holes = fill_holes(6.0F, 10.0F, mesh);
+  EXPECT_EQ(holes.filled_count, 1U);
+  EXPECT_EQ(analyze_topology(mesh).non_manifold_edges, 0U);
+}
+
 }  // namespace
 }  // namespace trigmesh

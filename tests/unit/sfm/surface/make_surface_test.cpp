@@ -192,13 +192,29 @@ TEST_F(MakeSurface, IsTheSameInAnyOrderOfWork) {
   EXPECT_EQ(forward->mesh.faces, backward->mesh.faces);
 }
 
-TEST_F(MakeSurface, TakesLargerVoxelsToKeepTheMemoryBudget) {
+TEST_F(MakeSurface, IsTheSameInOneTileAndInMany) {
+  const RenderedMaps maps(sphere, views_);
+  const auto whole = make(maps, {.voxel_size = 0.01});
+  const auto tiled = make(maps, {.voxel_size = 0.01, .max_tile_bytes = std::size_t{2} << 20U});
+  ASSERT_TRUE(whole && tiled);
+  EXPECT_EQ(whole->report.tile_count, 1U);
+  EXPECT_GT(tiled->report.tile_count, 3U);
+  EXPECT_EQ(tiled->report.memory_steps, 0);
+  EXPECT_LT(tiled->report.grid_bytes, whole->report.grid_bytes);
+  EXPECT_EQ(whole->mesh.positions, tiled->mesh.positions);
+  EXPECT_EQ(whole->mesh.normals, tiled->mesh.normals);
+  EXPECT_EQ(whole->mesh.colors, tiled->mesh.colors);
+  EXPECT_EQ(whole->mesh.faces, tiled->mesh.faces);
+  EXPECT_EQ(tiled->report.non_manifold_edges, 0U);
+}
+
+TEST_F(MakeSurface, TakesLargerVoxelsWhenTheMeshDoesNotFit) {
   const auto result = make(RenderedMaps(sphere, views_),
-                           {.voxel_size = 0.01, .max_memory_bytes = std::size_t{4} << 20U});
+                           {.voxel_size = 0.005, .max_memory_bytes = std::size_t{4} << 20U});
   ASSERT_TRUE(result) << result.error().message;
   EXPECT_GT(result->report.memory_steps, 0);
   EXPECT_NEAR(result->report.voxel_size,
-              0.01 * std::pow(kVoxelGrowthRatio, result->report.memory_steps),
+              0.005 * std::pow(kVoxelGrowthRatio, result->report.memory_steps),
               1e-9);
   EXPECT_LE(result->report.grid_bytes, std::size_t{4} << 20U);
 }

@@ -10,7 +10,13 @@ namespace {
 /// Three cameras above landmarks on the plane z = 0.
 Scene plane_scene() {
   Scene scene;
-  scene.cameras.push_back({.model = CameraModel::kPinhole, .width_px = 320, .height_px = 240, .fx_px = 300.0, .fy_px = 300.0, .cx_px = 159.5, .cy_px = 119.5});
+  scene.cameras.push_back({.model = CameraModel::kPinhole,
+                           .width_px = 320,
+                           .height_px = 240,
+                           .fx_px = 300.0,
+                           .fy_px = 300.0,
+                           .cx_px = 159.5,
+                           .cy_px = 119.5});
   for (int y = -15; y <= 15; ++y) {
     for (int x = -15; x <= 15; ++x) {
       Landmark landmark;
