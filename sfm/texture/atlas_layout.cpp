@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "firmware/base/check.hpp"
+#include "sfm/texture/chart_merging.hpp"
 #include "sfm/texture/mesh_projection.hpp"
 #include "sfm/texture/rectangle_packing.hpp"
 
@@ -189,6 +190,10 @@ Result<AtlasLayout> lay_out_atlas(const TriangleMesh& mesh,
                                   const AtlasOptions& options) {
   TM_RETURN_IF_ERROR(options.validate());
   const FaceCorners corners = picture_corners(mesh, views, charts);
+  for (Chart& chart : charts) {
+    find_rectangle(corners, views[chart.view].camera, options.texels_per_pixel, chart);
+  }
+  charts = merge_close_charts(std::move(charts), options.padding_px);
   std::vector<Chart> sheets = patch_sheets(labels);
   const std::size_t pictured_count = charts.size();
   charts.insert(

@@ -15,21 +15,33 @@
 namespace trigmesh {
 namespace {
 
-constexpr float kFlatGradient = 4.0F;          // grey levels; blank surfaces go by area and angle
-constexpr float kSilhouetteQuality = 0.05F;    // of a face wholly inside the margin
+constexpr float kFlatGradient = 4.0F;        // grey levels; blank surfaces go by area and angle
+constexpr float kSilhouetteQuality = 0.05F;  // of a face wholly inside the margin
+constexpr float kMakeshiftQuality = 0.02F;   // of looks that are better than none
+constexpr double kMakeshiftCosine = 0.05;
+constexpr int kMostHiddenPixels = 16;          // of a makeshift look: more of a wrong thing shows
+constexpr int kWorthSplittingPixels = 32;      // smaller faces are shown whole or not at all
 constexpr float kDepthSlackFootprints = 1.5F;  // a z-buffer's own rounding
 constexpr float kJumpFootprints = 4.0F;
 
 struct SeenFace {
   std::uint32_t face = 0;
+  bool makeshift = false;  ///< partly hidden or at a grazing angle
   FaceView view;
+};
+
+/// What one view sees.
+struct ViewLooks {
+  std::vector<SeenFace> seen;               ///< ascending by face
+  std::vector<std::uint32_t> seen_in_part;  ///< likewise; enough of them that the rest is a pity
 };
 
 /// What the pixels of one face add up to.
 struct PixelSums {
-  int pixels = 0;
+  int masked = 0;  ///< hidden or not
   int hidden = 0;
-  int masked = 0;
+  int visible = 0;
+  // Of the visible ones:
   int near_silhouette = 0;
   std::int64_t gradient = 0;
   std::array<std::int64_t, 3> color{};
@@ -61,11 +73,17 @@ cv::Mat gradient_image(const cv::Mat& rgb) {
 }
 
 void add_pixel(const ViewRasters& view, int x, int y, float inverse_depth, PixelSums& sums) {
-  ++sums.pixels;
   // A step of s along the axis is s / depth * focal footprints of a pixel.
   const float behind = (view.inverse_depth.at<float>(y, x) / inverse_depth - 1.0F) * view.focal_px;
-  sums.hidden += behind > kDepthSlackFootprints ? 1 : 0;
-  sums.masked += (!view.mask.empty() && view.mask.at<std::uint8_t>(y, x) == 0) ? 1 : 0;
+  if (!view.mask.empty() && view.mask.at<std::uint8_t>(y, x) == 0) {
+    ++sums.masked;
+    return;
+  }
+  if (behind > kDepthSlackFootprints) {
+    ++sums.hidden;
+    return;
+  }
+  ++sums.visible;
   sums.near_silhouette += view.silhouettes.at<std::uint8_t>(y, x) != 0 ? 1 : 0;
   sums.gradient += view.gradient.at<std::uint8_t>(y, x);
   const auto& rgb = view.rgb.at<cv::Vec3b>(y, x);
@@ -86,15 +104,19 @@ PixelSums sum_pixels(const ViewRasters& view, const ProjectedFace& face, PixelBo
   rasterize_triangle(face.corners_px, bounds, [&](int x, int y, const Eigen::Vector3f& weights) {
     add_pixel(view, x, y, weights.dot(face.inverse_depth), sums);
   });
-  if (sums.pixels == 0) {  // smaller than the grid: look at the pixel in which its middle lies
-    const Eigen::Vector2f middle =
-        (face.corners_px[0] + face.corners_px[1] + face.corners_px[2]) / 3.0F;
-    add_pixel(view,
-              static_cast<int>(std::lround(middle.x())),
-              static_cast<int>(std::lround(middle.y())),
-              face.inverse_depth.mean(),
-              sums);
-  }
+  return sums;
+}
+
+/// Of a face without a pixel, smaller than the grid: the pixel in which its middle lies.
+PixelSums middle_pixel(const ViewRasters& view, const ProjectedFace& face) {
+  PixelSums sums;
+  const Eigen::Vector2f middle =
+      (face.corners_px[0] + face.corners_px[1] + face.corners_px[2]) / 3.0F;
+  add_pixel(view,
+            static_cast<int>(std::lround(middle.x())),
+            static_cast<int>(std::lround(middle.y())),
+            face.inverse_depth.mean(),
+            sums);
   return sums;
 }
 
@@ -111,60 +133,126 @@ double view_cosine(const TriangleMesh& mesh, std::size_t face, const Eigen::Vect
 }
 
 float face_quality(const PixelSums& sums, float area_px, double cosine) {
-  const auto pixels = static_cast<float>(sums.pixels);
-  const float sharpness = static_cast<float>(sums.gradient) / pixels + kFlatGradient;
-  const float clear = 1.0F - static_cast<float>(sums.near_silhouette) / pixels;
-  return std::max(area_px, 1e-6F) * static_cast<float>(cosine) * sharpness *
+  const auto visible = static_cast<float>(sums.visible);
+  const float sharpness = static_cast<float>(sums.gradient) / visible + kFlatGradient;
+  const float clear = 1.0F - static_cast<float>(sums.near_silhouette) / visible;
+  const float shown = visible / static_cast<float>(sums.visible + sums.hidden);
+  return std::max(area_px, 1e-6F) * static_cast<float>(cosine) * sharpness * shown * shown *
          (kSilhouetteQuality + (1.0F - kSilhouetteQuality) * clear);
 }
 
-std::vector<SeenFace> look_from(const TriangleMesh& mesh,
-                                const DenseView& view,
-                                std::uint32_t index,
-                                const ViewImage& image,
-                                const VisibilityOptions& options) {
-  const PixelBounds bounds{view.camera.width_px, view.camera.height_px};
-  const ProjectedMesh projected = project_mesh(mesh, view.camera, view.cam_from_world);
-  ViewRasters rasters{.rgb = image.rgb,
-                      .mask = image.mask,
-                      .gradient = gradient_image(image.rgb),
-                      .inverse_depth = render_inverse_depth(mesh, projected, bounds),
-                      .silhouettes = {},
-                      .focal_px = static_cast<float>(view.camera.fx_px)};
-  rasters.silhouettes =
-      silhouette_mask(rasters.inverse_depth, view.camera.fx_px, options.silhouette_margin_px);
-  const Eigen::Vector3d camera = camera_center(view.cam_from_world);
-  std::vector<SeenFace> seen;
-  for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
-    const ProjectedFace face = project_face(mesh, projected, f);
-    const float area_px = -0.5F * doubled_area_px(face);
-    if (!face.in_front || !(area_px > 0.0F) || !inside(face, bounds)) {
-      continue;
-    }
-    const double cosine = view_cosine(mesh, f, camera);
-    if (cosine < options.min_view_cosine) {
-      continue;
-    }
-    const PixelSums sums = sum_pixels(rasters, face, bounds);
-    if (sums.hidden > 0 || sums.masked > 0) {
-      continue;
-    }
-    SeenFace& entry = seen.emplace_back();
-    entry.face = static_cast<std::uint32_t>(f);
-    entry.view = {.view = index, .quality = face_quality(sums, area_px, cosine), .color = {}};
-    for (std::size_t c = 0; c < 3; ++c) {
-      entry.view.color[c] = static_cast<std::uint16_t>(
-          static_cast<float>(sums.color[c]) / static_cast<float>(sums.pixels) * kColorUnits);
-    }
-  }
-  return seen;
+ViewRasters rasters_of(const TriangleMesh& mesh,
+                       const ProjectedMesh& projected,
+                       const Camera& camera,
+                       const ViewImage& image,
+                       int silhouette_margin_px) {
+  ViewRasters rasters{
+      .rgb = image.rgb,
+      .mask = image.mask,
+      .gradient = gradient_image(image.rgb),
+      .inverse_depth = render_inverse_depth(mesh, projected, {camera.width_px, camera.height_px}),
+      .silhouettes = {},
+      .focal_px = static_cast<float>(camera.fx_px)};
+  rasters.silhouettes = silhouette_mask(rasters.inverse_depth, camera.fx_px, silhouette_margin_px);
+  return rasters;
 }
 
-FaceViews gather(const std::vector<std::vector<SeenFace>>& by_view, std::size_t face_count) {
+/// Whether a face lies across the camera's plane and reaches into the picture.
+bool reaches_in(const ProjectedFace& face, PixelBounds bounds) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Eigen::Vector2f& p = face.corners_px[i];
+    if (face.inverse_depth[static_cast<Eigen::Index>(i)] > 0.0F && p.x() >= 0.0F && p.y() >= 0.0F &&
+        p.x() < static_cast<float>(bounds.width) && p.y() < static_cast<float>(bounds.height)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+FaceView face_view(std::uint32_t view, const PixelSums& sums, float quality) {
+  FaceView result{.view = view, .quality = quality, .color = {}};
+  for (std::size_t c = 0; c < 3; ++c) {
+    result.color[c] = static_cast<std::uint16_t>(static_cast<float>(sums.color[c]) /
+                                                 static_cast<float>(sums.visible) * kColorUnits);
+  }
+  return result;
+}
+
+ViewLooks look_from(const TriangleMesh& mesh,
+                    const DenseView& view,
+                    std::uint32_t index,
+                    const ViewImage& image,
+                    const VisibilityOptions& options) {
+  const PixelBounds bounds{view.camera.width_px, view.camera.height_px};
+  const ProjectedMesh projected = project_mesh(mesh, view.camera, view.cam_from_world);
+  const ViewRasters rasters =
+      rasters_of(mesh, projected, view.camera, image, options.silhouette_margin_px);
+  const Eigen::Vector3d camera = camera_center(view.cam_from_world);
+  ViewLooks looks;
+  for (std::uint32_t f = 0; f < mesh.faces.size(); ++f) {
+    const ProjectedFace face = project_face(mesh, projected, f);
+    const double cosine = view_cosine(mesh, f, camera);
+    if (cosine < kMakeshiftCosine) {
+      continue;
+    }
+    if (!face.in_front) {
+      if (reaches_in(face, bounds)) {
+        looks.seen_in_part.push_back(f);
+      }
+      continue;
+    }
+    const float area_px = -0.5F * doubled_area_px(face);
+    if (!(area_px > 0.0F)) {
+      continue;
+    }
+    const bool in_picture = inside(face, bounds);
+    PixelSums sums = sum_pixels(rasters, face, bounds);
+    if (in_picture && sums.visible + sums.hidden + sums.masked == 0) {
+      sums = middle_pixel(rasters, face);
+    }
+    const bool whole = in_picture && sums.masked == 0 && sums.hidden == 0;
+    if (!whole && sums.visible >= kWorthSplittingPixels) {
+      looks.seen_in_part.push_back(f);
+    }
+    if (in_picture && sums.masked == 0 &&
+        sums.hidden <= std::min(sums.visible, kMostHiddenPixels)) {
+      const bool makeshift = !whole || cosine < options.min_view_cosine;
+      const float quality =
+          face_quality(sums, area_px, cosine) * (makeshift ? kMakeshiftQuality : 1.0F);
+      looks.seen.push_back({f, makeshift, face_view(index, sums, quality)});
+    }
+  }
+  return looks;
+}
+
+/// Faces that some view sees in part and no view sees well.
+std::vector<std::uint32_t> faces_to_split(const std::vector<ViewLooks>& by_view,
+                                          std::size_t face_count) {
+  std::vector<std::uint8_t> wanted(face_count, 0);
+  for (const ViewLooks& looks : by_view) {
+    for (const std::uint32_t face : looks.seen_in_part) {
+      wanted[face] = 1;
+    }
+  }
+  for (const ViewLooks& looks : by_view) {
+    for (const SeenFace& entry : looks.seen) {
+      wanted[entry.face] &= entry.makeshift ? 1 : 0;
+    }
+  }
+  std::vector<std::uint32_t> faces;
+  for (std::uint32_t f = 0; f < face_count; ++f) {
+    if (wanted[f] != 0) {
+      faces.push_back(f);
+    }
+  }
+  return faces;
+}
+
+FaceViews gather(const std::vector<ViewLooks>& by_view, std::size_t face_count) {
   FaceViews result;
   result.offsets.assign(face_count + 1, 0);
-  for (const auto& seen : by_view) {
-    for (const SeenFace& entry : seen) {
+  for (const ViewLooks& looks : by_view) {
+    for (const SeenFace& entry : looks.seen) {
       ++result.offsets[entry.face + 1];
     }
   }
@@ -173,11 +261,12 @@ FaceViews gather(const std::vector<std::vector<SeenFace>>& by_view, std::size_t 
   }
   result.entries.resize(result.offsets.back());
   std::vector<std::size_t> next(result.offsets.begin(), result.offsets.end() - 1);
-  for (const auto& seen : by_view) {
-    for (const SeenFace& entry : seen) {
+  for (const ViewLooks& looks : by_view) {
+    for (const SeenFace& entry : looks.seen) {
       result.entries[next[entry.face]++] = entry.view;
     }
   }
+  result.worth_splitting = faces_to_split(by_view, face_count);
   return result;
 }
 
@@ -243,7 +332,7 @@ Result<FaceViews> find_face_views(const TriangleMesh& mesh,
                                   const VisibilityOptions& options,
                                   Executor& executor) {
   TM_RETURN_IF_ERROR(options.validate());
-  std::vector<std::vector<SeenFace>> by_view(views.size());
+  std::vector<ViewLooks> by_view(views.size());
   std::vector<std::optional<Error>> errors(views.size());
   executor.for_each_index(views.size(), [&](std::size_t v) {
     auto image = load_view(views, images, v);

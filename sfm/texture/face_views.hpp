@@ -28,6 +28,9 @@ inline constexpr float kColorUnits = 256.0F;
 struct FaceViews {
   std::vector<std::size_t> offsets;
   std::vector<FaceView> entries;
+  /// Faces that no view sees whole, but of which some view sees more than a few pixels; ascending.
+  /// Split, they may be seen.
+  std::vector<std::uint32_t> worth_splitting;
 
   [[nodiscard]] std::size_t face_count() const { return offsets.size() - 1; }
 
@@ -39,7 +42,7 @@ struct FaceViews {
 struct VisibilityOptions {
   /// Smallest cosine between the face's normal and the direction to the camera, (0, 1). Pictures
   /// taken at a grazing angle are stretched and show the wrong thing where the mesh is off a
-  /// little.
+  /// little; they are makeshift.
   double min_view_cosine = 0.2;
   /// Within this distance of a jump in depth a pixel may belong to the other side, because no mesh
   /// and no pose is exact; pixels, [0, 64]. Faces there are taken only if no other view is clear.
@@ -51,7 +54,9 @@ struct VisibilityOptions {
 /// Looks at the mesh from every view, one at a time in each thread: projects it into a z-buffer and
 /// lists the faces that lie wholly inside the picture, face the camera, and are neither hidden by
 /// another part of the mesh nor masked. Quality is projected area times cosine times sharpness
-/// (mean gradient of the picture), lowered near silhouettes. Memory: one picture and one depth
+/// (mean gradient of the picture), lowered near silhouettes. Makeshift looks are listed too, of a
+/// fiftieth of that quality: at grazing angles, and with a few hidden pixels, fewer than are seen.
+/// Colours are those of the pixels that are not hidden. Memory: one picture and one depth
 /// raster a thread, 12 bytes a face and view that sees it. Errors are those of `images`;
 /// kInvalidArgument when a picture has not the size of its camera.
 [[nodiscard]] Result<FaceViews> find_face_views(const TriangleMesh& mesh,

@@ -8,6 +8,7 @@
 #include "sfm/texture/atlas_pictures.hpp"
 #include "sfm/texture/charts.hpp"
 #include "sfm/texture/color_outliers.hpp"
+#include "sfm/texture/face_splitting.hpp"
 #include "sfm/texture/mesh_topology.hpp"
 #include "sfm/texture/seam_leveling.hpp"
 #include "sfm/texture/view_gains.hpp"
@@ -17,6 +18,9 @@ namespace trigmesh {
 namespace {
 
 constexpr std::size_t kSmallChartFaces = 6;
+constexpr int kMostSplits = 8;  // a face of 1000 px ends at 4 px
+// Fewer faces than one in so many are not worth another look from all views.
+constexpr std::size_t kSplitShare = 10'000;
 
 Result<> check_range(const char* name, int value, int low, int high) {
   if (value < low || value > high) {
@@ -58,6 +62,30 @@ Result<> check_input(const TriangleMesh& mesh, std::span<const DenseView> views)
     }
   }
   return {};
+}
+
+/// A surface whose faces are small enough to be seen whole, and who sees them.
+struct SeenSurface {
+  TriangleMesh mesh;
+  FaceViews seen;
+};
+
+Result<SeenSurface> look_at_surface(const TriangleMesh& mesh,
+                                    std::span<const DenseView> views,
+                                    const ViewImageSource& images,
+                                    const VisibilityOptions& options,
+                                    Executor& executor) {
+  SeenSurface surface{.mesh = mesh, .seen = {}};
+  for (int splits = 0;; ++splits) {
+    TM_ASSIGN_OR_RETURN(surface.seen,
+                        find_face_views(surface.mesh, views, images, options, executor));
+    const std::vector<std::uint32_t>& wanted = surface.seen.worth_splitting;
+    if (splits == kMostSplits || wanted.empty() ||
+        wanted.size() * kSplitShare < surface.mesh.faces.size()) {
+      return surface;
+    }
+    surface.mesh = split_faces(surface.mesh, wanted);
+  }
 }
 
 /// Median over the textured faces of world length a texel.
@@ -153,28 +181,31 @@ Result<> TextureOptions::validate() const {
   return check_range("labeling_sweeps", labeling_sweeps, 1, 20);
 }
 
-Result<TextureResult> texture_surface(const TriangleMesh& mesh,
+Result<TextureResult> texture_surface(const TriangleMesh& given_mesh,
                                       std::span<const DenseView> views,
                                       const ViewImageSource& images,
                                       const TextureOptions& options,
                                       Executor& executor) {
   TM_RETURN_IF_ERROR(options.validate());
-  TM_RETURN_IF_ERROR(check_input(mesh, views));
+  TM_RETURN_IF_ERROR(check_input(given_mesh, views));
+  TM_ASSIGN_OR_RETURN(SeenSurface surface,
+                      look_at_surface(given_mesh, views, images, options.visibility, executor));
+  const TriangleMesh& mesh = surface.mesh;
   TextureResult result;
   result.report.face_count = mesh.faces.size();
+  result.report.added_face_count = mesh.faces.size() - given_mesh.faces.size();
   result.report.view_count = views.size();
 
-  TM_ASSIGN_OR_RETURN(FaceViews seen,
-                      find_face_views(mesh, views, images, options.visibility, executor));
-  const std::vector<ColorGain> gains = estimate_view_gains(seen, views.size());
+  const std::vector<ColorGain> gains = estimate_view_gains(surface.seen, views.size());
   report_gains(gains, result.report);
-  OutlierRejection agreed = reject_color_outliers(seen, gains, executor);
-  seen = {};
+  std::vector<std::array<std::uint32_t, 3>> neighbors = face_neighbors(mesh);
+  OutlierRejection agreed = reject_color_outliers(surface.seen, neighbors, gains, executor);
+  surface.seen = {};
   result.report.rejected_look_count = agreed.rejected_count;
 
   const LabelingProblem problem =
       make_labeling_problem(agreed.faces,
-                            face_neighbors(mesh),
+                            std::move(neighbors),
                             static_cast<std::uint32_t>(views.size()),
                             options.seam_cost,
                             static_cast<std::size_t>(options.max_candidates));

@@ -31,12 +31,13 @@ struct TextureOptions {
 };
 
 struct TextureReport {
-  std::size_t face_count = 0;
+  std::size_t face_count = 0;           ///< after splitting
+  std::size_t added_face_count = 0;     ///< by splitting those that no view saw whole
   std::size_t textured_face_count = 0;  ///< the others have colours, but no picture
   std::size_t view_count = 0;
   std::size_t used_view_count = 0;      ///< views of which something is in the atlas
   std::size_t rejected_look_count = 0;  ///< (face, view) pairs rejected as colour outliers
-  std::size_t chart_count = 0;
+  std::size_t chart_count = 0;          ///< rectangles of pictures in the atlas
   int page_count = 0;
   int page_size_px = 0;
   double atlas_fill_ratio = 0.0;  ///< area of the chart rectangles / area of the pages
@@ -55,10 +56,11 @@ struct TextureResult {
   TextureReport report;
 };
 
-/// Puts the pictures of the views on the mesh: which views see which face and how well; their
-/// exposures levelled; views that disagree rejected; one view a face with few seams; charts packed
-/// on pages; colours levelled across the seams. Faces that no view sees continue the colours around
-/// them or, far from any picture, have the mesh's vertex colours.
+/// Puts the pictures of the views on the mesh: faces that only parts of are seen are split; which
+/// views see which face and how well; their exposures levelled; views that disagree rejected; one
+/// view a face with few seams; charts packed on pages; colours levelled across the seams. Faces
+/// that no view sees continue the colours around them or, far from any picture, have the mesh's
+/// vertex colours.
 ///
 /// `views` are pinhole cameras; pictures are loaded twice, one at a time in each thread of
 /// `executor`. Deterministic, whatever the executor. kInvalidArgument: options, a view without a

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "sfm/texture/color_outliers.hpp"
+#include "sfm/texture/mesh_topology.hpp"
 #include "sfm/texture/view_gains.hpp"
 
 namespace trigmesh {
@@ -31,6 +32,8 @@ TEST(EstimateViewGains, UndoesExposureAndWhiteBalance) {
   EXPECT_EQ(gains[3], (ColorGain{1.0F, 1.0F, 1.0F}));
 }
 
+const FaceNeighbors kAlone{{kNoFace, kNoFace, kNoFace}};
+
 TEST(RejectColorOutliers, DropsTheOneThatDisagrees) {
   FaceViews faces;
   faces.entries = {look(0, 100, 90, 80),
@@ -41,10 +44,39 @@ TEST(RejectColorOutliers, DropsTheOneThatDisagrees) {
   faces.offsets = {0, 5};
   SerialExecutor executor;
   const std::vector<ColorGain> gains(5, ColorGain{1.0F, 1.0F, 1.0F});
-  const OutlierRejection result = reject_color_outliers(faces, gains, executor);
+  const OutlierRejection result = reject_color_outliers(faces, kAlone, gains, executor);
   EXPECT_EQ(result.rejected_count, 1U);
   ASSERT_EQ(result.faces.of(0).size(), 4U);
   EXPECT_EQ(result.faces.of(0)[2].view, 3U);
+}
+
+/// A strip of faces that five views see; view 2 is `excess` brighter on the faces that `where`
+/// names.
+template <typename Where>
+std::size_t rejected_on_strip(int excess, const Where& where) {
+  constexpr std::uint32_t kFaces = 40;
+  FaceViews faces;
+  FaceNeighbors neighbors;
+  faces.offsets = {0};
+  for (std::uint32_t f = 0; f < kFaces; ++f) {
+    for (std::uint32_t v = 0; v < 5; ++v) {
+      const double bright = 100.0 + (v == 2 ? where(f) * excess : 0);
+      faces.entries.push_back(look(v, bright, bright, bright));
+    }
+    faces.offsets.push_back(faces.entries.size());
+    neighbors.push_back({f > 0 ? f - 1 : kNoFace, f + 1 < kFaces ? f + 1 : kNoFace, kNoFace});
+  }
+  SerialExecutor executor;
+  const std::vector<ColorGain> gains(5, ColorGain{1.0F, 1.0F, 1.0F});
+  return reject_color_outliers(faces, neighbors, gains, executor).rejected_count;
+}
+
+TEST(RejectColorOutliers, FinePatternsOffByAPixelStayThingsInTheWayGo) {
+  const auto checkered = [](std::uint32_t f) { return f % 2 == 0 ? 1 : -1; };
+  EXPECT_EQ(rejected_on_strip(50, checkered), 0U);
+  const auto thing = [](std::uint32_t f) { return f >= 10 && f < 30 ? 1 : 0; };
+  EXPECT_GE(rejected_on_strip(50, thing), 20U);
+  EXPECT_LE(rejected_on_strip(50, thing), 26U);
 }
 
 TEST(RejectColorOutliers, ThreeViewsAreTooFewToJudge) {
@@ -53,7 +85,7 @@ TEST(RejectColorOutliers, ThreeViewsAreTooFewToJudge) {
   faces.offsets = {0, 3};
   SerialExecutor executor;
   const std::vector<ColorGain> gains(3, ColorGain{1.0F, 1.0F, 1.0F});
-  EXPECT_EQ(reject_color_outliers(faces, gains, executor).rejected_count, 0U);
+  EXPECT_EQ(reject_color_outliers(faces, kAlone, gains, executor).rejected_count, 0U);
 }
 
 }  // namespace

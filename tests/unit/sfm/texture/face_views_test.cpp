@@ -54,6 +54,44 @@ TEST(FindFaceViews, NearerAndSteeperViewsAreBetter) {
   EXPECT_GT(faces->of(0)[0].quality, faces->of(0)[2].quality);
 }
 
+TEST(FindFaceViews, LooksWithAFewHiddenPixelsAreMakeshift) {
+  const TriangleMesh ground = square_mesh(0.5, 20, 0.0);  // faces of some five pixels
+  TriangleMesh covered = ground;
+  append(covered, square_mesh(0.1512, 1, 0.3));
+  PaintedScene scene;
+  scene.add_view({0.0, 0.1, 2.0}, ground_color);
+  SerialExecutor executor;
+  const VisibilityOptions no_margin{.min_view_cosine = 0.2, .silhouette_margin_px = 0};
+  const auto open = find_face_views(ground, scene.views, scene.images, no_margin, executor);
+  const auto faces = find_face_views(covered, scene.views, scene.images, no_margin, executor);
+  ASSERT_TRUE(open.has_value() && faces.has_value());
+  EXPECT_TRUE(faces->worth_splitting.empty());
+  std::size_t hidden = 0;
+  std::size_t makeshift = 0;
+  for (std::size_t f = 0; f < ground.faces.size(); ++f) {
+    ASSERT_EQ(open->of(f).size(), 1U);
+    if (faces->of(f).empty()) {
+      ++hidden;
+    } else if (faces->of(f)[0].quality < 0.1F * open->of(f)[0].quality) {
+      ++makeshift;
+    }
+  }
+  EXPECT_GT(hidden, 40U);     // under the middle of the lid
+  EXPECT_GT(makeshift, 5U);   // under its rim
+  EXPECT_LT(makeshift, 80U);  // the rest lies in the open
+}
+
+TEST(FindFaceViews, NamesFacesThatAreSeenInPart) {
+  const TriangleMesh mesh = square_mesh(3.0, 1, 0.0);  // beyond the picture on all sides
+  PaintedScene scene;
+  scene.add_view({0.0, 0.1, 2.0}, ground_color);
+  SerialExecutor executor;
+  const auto faces = find_face_views(mesh, scene.views, scene.images, {}, executor);
+  ASSERT_TRUE(faces.has_value());
+  EXPECT_TRUE(faces->entries.empty());
+  EXPECT_EQ(faces->worth_splitting, (std::vector<std::uint32_t>{0, 1}));
+}
+
 TEST(FindFaceViews, RefusesPicturesOfAnotherSize) {
   PaintedScene scene;
   scene.add_view({0.0, 0.1, 1.5}, ground_color);

@@ -115,6 +115,22 @@ TEST(TextureSurface, LevelsExposures) {
   EXPECT_LT(result.report.seam_step_after, 1.0);
 }
 
+TEST(TextureSurface, SplitsATriangleThatTwoViewsSeeInHalves) {
+  TriangleMesh mesh;
+  mesh.positions = {{-1.5F, -0.4F, 0.0F}, {1.5F, -0.4F, 0.0F}, {0.0F, 0.6F, 0.0F}};
+  mesh.faces = {{0, 1, 2}};
+  PaintedScene scene;
+  for (const double x : {-0.8, 0.8}) {
+    scene.add_view({x, 0.1, 2.0}, ground_color);
+    scene.views.back().cam_from_world = looking_at({x, 0.1, 2.0}, {x, 0.0, 0.0});
+    scene.images.pictures.back().rgb = ray_picture(scene.views.back(), ground_color);
+  }
+  const TextureResult result = texture(mesh, scene);
+  EXPECT_GT(result.report.added_face_count, 10U);
+  EXPECT_EQ(result.report.textured_face_count, result.report.face_count);
+  EXPECT_GT(psnr_from(result.textured, {0.0, -0.2, 2.5}, ground_color), 42.0);
+}
+
 TEST(TextureSurface, UnseenFacesContinueTheColoursAroundThem) {
   TriangleMesh mesh = square_mesh(0.6, 8, 0.0);
   PaintedScene scene;
