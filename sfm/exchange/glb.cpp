@@ -6,19 +6,25 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <span>
 #include <sstream>
 #include <utility>
 
 #include <tiny_gltf.h>
 
+#include <nlohmann/json.hpp>
+
 #include "firmware/base/check.hpp"
+#include "sfm/exchange/byte_io.hpp"
 
 namespace trigmesh {
 namespace {
 
 constexpr std::size_t kAlignment = 4;
 constexpr std::size_t kMostBufferBytes = std::numeric_limits<std::uint32_t>::max() - (1U << 20U);
+constexpr std::size_t kFileHeadBytes = 12;
+constexpr std::size_t kChunkHeadBytes = 8;
+constexpr std::uint32_t kJsonChunk = 0x4E4F534A;    // "JSON"
+constexpr std::uint32_t kBinaryChunk = 0x004E4942;  // "BIN"
 constexpr const char* kUnlit = "KHR_materials_unlit";
 
 /// The vertices and faces of one primitive.
@@ -30,36 +36,44 @@ struct Surface {
   std::vector<std::uint32_t> corners;                ///< three for each face
 };
 
-/// Appends bytes to the one buffer, aligned; the number of the view that holds them.
-int add_view(tinygltf::Model& model, std::span<const std::uint8_t> bytes, int target) {
-  std::vector<unsigned char>& data = model.buffers.front().data;
+/// A model whose one buffer lies beside it, in parts, so that the file can be put together with no
+/// second copy of it: tinygltf alone would hold three.
+struct GlbModel {
+  tinygltf::Model json;
+  std::vector<std::vector<std::uint8_t>> parts;  ///< each as long as a multiple of kAlignment
+  std::size_t buffer_bytes = 0;
+};
+
+/// Appends bytes to the buffer, aligned; the number of the view that holds them.
+int add_view(GlbModel& model, std::vector<std::uint8_t> bytes, int target) {
   tinygltf::BufferView view;
   view.buffer = 0;
-  view.byteOffset = data.size();
+  view.byteOffset = model.buffer_bytes;
   view.byteLength = bytes.size();
   view.target = target;
-  data.insert(data.end(), bytes.begin(), bytes.end());
-  data.resize((data.size() + kAlignment - 1) / kAlignment * kAlignment, 0);
-  model.bufferViews.push_back(std::move(view));
-  return static_cast<int>(model.bufferViews.size() - 1);
+  bytes.resize((bytes.size() + kAlignment - 1) / kAlignment * kAlignment, 0);
+  model.buffer_bytes += bytes.size();
+  model.parts.push_back(std::move(bytes));
+  model.json.bufferViews.push_back(std::move(view));
+  return static_cast<int>(model.json.bufferViews.size() - 1);
 }
 
 /// An accessor that is the only one of its view.
 template <typename T>
-int add_accessor(tinygltf::Model& model,
+int add_accessor(GlbModel& model,
                  const std::vector<T>& values,
                  int component_type,
                  int type,
                  int target = TINYGLTF_TARGET_ARRAY_BUFFER) {
   const auto* const bytes = reinterpret_cast<const std::uint8_t*>(values.data());
   tinygltf::Accessor accessor;
-  accessor.bufferView = add_view(model, {bytes, values.size() * sizeof(T)}, target);
+  accessor.bufferView = add_view(model, {bytes, bytes + values.size() * sizeof(T)}, target);
   accessor.componentType = component_type;
   accessor.type = type;
   accessor.count = values.size();
   accessor.normalized = component_type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT;
-  model.accessors.push_back(std::move(accessor));
-  return static_cast<int>(model.accessors.size() - 1);
+  model.json.accessors.push_back(std::move(accessor));
+  return static_cast<int>(model.json.accessors.size() - 1);
 }
 
 void set_bounds(tinygltf::Accessor& accessor, const std::vector<Eigen::Vector3f>& positions) {
@@ -75,13 +89,13 @@ void set_bounds(tinygltf::Accessor& accessor, const std::vector<Eigen::Vector3f>
   accessor.maxValues.assign(high_exact.begin(), high_exact.end());
 }
 
-void add_primitive(tinygltf::Model& model, const Surface& surface, int material) {
+void add_primitive(GlbModel& model, const Surface& surface, int material) {
   tinygltf::Primitive primitive;
   primitive.mode = TINYGLTF_MODE_TRIANGLES;
   primitive.material = material;
   const int positions =
       add_accessor(model, surface.positions, TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_VEC3);
-  set_bounds(model.accessors.back(), surface.positions);
+  set_bounds(model.json.accessors.back(), surface.positions);
   primitive.attributes["POSITION"] = positions;
   primitive.attributes["NORMAL"] =
       add_accessor(model, surface.normals, TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_VEC3);
@@ -98,11 +112,11 @@ void add_primitive(tinygltf::Model& model, const Surface& surface, int material)
                                    TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT,
                                    TINYGLTF_TYPE_SCALAR,
                                    TINYGLTF_TARGET_ELEMENT_ARRAY_BUFFER);
-  model.meshes.front().primitives.push_back(std::move(primitive));
+  model.json.meshes.front().primitives.push_back(std::move(primitive));
 }
 
 /// `texture` is -1 for none.
-int add_material(tinygltf::Model& model, std::string name, int texture) {
+int add_material(GlbModel& model, std::string name, int texture) {
   tinygltf::Material material;
   material.name = std::move(name);
   material.doubleSided = true;  // a scan is open: its back is better seen than missing
@@ -110,33 +124,33 @@ int add_material(tinygltf::Model& model, std::string name, int texture) {
   material.pbrMetallicRoughness.roughnessFactor = 1.0;
   material.pbrMetallicRoughness.baseColorTexture.index = texture;
   material.extensions[kUnlit] = tinygltf::Value(tinygltf::Value::Object());
-  model.materials.push_back(std::move(material));
-  return static_cast<int>(model.materials.size() - 1);
+  model.json.materials.push_back(std::move(material));
+  return static_cast<int>(model.json.materials.size() - 1);
 }
 
-Result<int> add_texture(tinygltf::Model& model,
+Result<int> add_texture(GlbModel& model,
                         const cv::Mat& page,
                         const PageEncoding& encoding,
                         const std::string& name) {
-  TM_ASSIGN_OR_RETURN(const std::vector<std::uint8_t> bytes, encode_page(page, encoding));
+  TM_ASSIGN_OR_RETURN(std::vector<std::uint8_t> bytes, encode_page(page, encoding));
   tinygltf::Image image;
   image.name = name;
   image.mimeType = std::string(mime_type(encoding.format));
-  image.bufferView = add_view(model, bytes, 0);
-  model.images.push_back(std::move(image));
-  if (model.samplers.empty()) {
+  image.bufferView = add_view(model, std::move(bytes), 0);
+  model.json.images.push_back(std::move(image));
+  if (model.json.samplers.empty()) {
     tinygltf::Sampler sampler;
     sampler.magFilter = TINYGLTF_TEXTURE_FILTER_LINEAR;
     sampler.minFilter = TINYGLTF_TEXTURE_FILTER_LINEAR_MIPMAP_LINEAR;
     sampler.wrapS = TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE;
     sampler.wrapT = TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE;
-    model.samplers.push_back(std::move(sampler));
+    model.json.samplers.push_back(std::move(sampler));
   }
   tinygltf::Texture texture;
   texture.sampler = 0;
-  texture.source = static_cast<int>(model.images.size() - 1);
-  model.textures.push_back(std::move(texture));
-  return static_cast<int>(model.textures.size() - 1);
+  texture.source = static_cast<int>(model.json.images.size() - 1);
+  model.json.textures.push_back(std::move(texture));
+  return static_cast<int>(model.json.textures.size() - 1);
 }
 
 /// The matrix of a placement, column by column.
@@ -152,8 +166,9 @@ tinygltf::Value matrix_of(const ModelPlacement& placement) {
 }
 
 /// One scene of one node of one mesh, without primitives.
-tinygltf::Model empty_model(const GlbOptions& options) {
-  tinygltf::Model model;
+GlbModel empty_model(const GlbOptions& options) {
+  GlbModel result;
+  tinygltf::Model& model = result.json;
   model.asset.version = "2.0";
   model.asset.generator = options.generator;
   tinygltf::Value::Object extras;
@@ -162,7 +177,6 @@ tinygltf::Model empty_model(const GlbOptions& options) {
   extras["model_from_world"] = matrix_of(options.placement);
   model.asset.extras = tinygltf::Value(std::move(extras));
   model.extensionsUsed = {kUnlit};
-  model.buffers.emplace_back();
   model.meshes.emplace_back();
   model.meshes.front().name = options.mesh_name;
   tinygltf::Node node;
@@ -173,22 +187,55 @@ tinygltf::Model empty_model(const GlbOptions& options) {
   scene.nodes = {0};
   model.scenes.push_back(std::move(scene));
   model.defaultScene = 0;
-  return model;
+  return result;
 }
 
-Result<std::string> to_bytes(const tinygltf::Model& model) {
-  if (model.buffers.front().data.size() > kMostBufferBytes) {
-    return fail(ErrorCode::kLimitExceeded,
-                "the mesh and its pages take {} bytes, a GLB file holds at most {}",
-                model.buffers.front().data.size(),
-                kMostBufferBytes);
-  }
+/// The JSON of a model, padded with blanks.
+Result<std::string> json_chunk(const GlbModel& model) {
   std::ostringstream out;
   tinygltf::TinyGLTF writer;
-  if (!writer.WriteGltfSceneToStream(&model, out, false, true)) {
+  if (!writer.WriteGltfSceneToStream(&model.json, out, false, false)) {
     return fail(ErrorCode::kInternal, "tinygltf cannot write the model");
   }
-  return std::move(out).str();
+  nlohmann::json json = nlohmann::json::parse(std::move(out).str(), nullptr, false);
+  if (json.is_discarded()) {
+    return fail(ErrorCode::kInternal, "tinygltf writes a model that is no JSON");
+  }
+  json["buffers"] = nlohmann::json::array({{{"byteLength", model.buffer_bytes}}});
+  std::string chunk = json.dump();
+  chunk.resize((chunk.size() + kAlignment - 1) / kAlignment * kAlignment, ' ');
+  return chunk;
+}
+
+void write_chunk_head(std::uint32_t bytes, std::uint32_t type, ByteWriter& out) {
+  out.value<std::uint32_t>(bytes);
+  out.value<std::uint32_t>(type);
+}
+
+/// The container. Each part is freed as soon as it is in the file.
+Result<std::string> to_bytes(GlbModel model) {
+  if (model.buffer_bytes > kMostBufferBytes) {
+    return fail(ErrorCode::kLimitExceeded,
+                "the mesh and its pages take {} bytes, a GLB file holds at most {}",
+                model.buffer_bytes,
+                kMostBufferBytes);
+  }
+  TM_ASSIGN_OR_RETURN(const std::string json, json_chunk(model));
+  const std::size_t file_bytes =
+      kFileHeadBytes + 2 * kChunkHeadBytes + json.size() + model.buffer_bytes;
+  ByteWriter out;
+  out.reserve(file_bytes);
+  out.text("glTF");
+  out.value<std::uint32_t>(2);
+  out.value<std::uint32_t>(static_cast<std::uint32_t>(file_bytes));
+  write_chunk_head(static_cast<std::uint32_t>(json.size()), kJsonChunk, out);
+  out.text(json);
+  write_chunk_head(static_cast<std::uint32_t>(model.buffer_bytes), kBinaryChunk, out);
+  for (std::vector<std::uint8_t>& part : model.parts) {
+    out.text({reinterpret_cast<const char*>(part.data()), part.size()});
+    part = {};
+  }
+  return std::move(out).take();
 }
 
 /// Splits vertices by texture coordinate: the copies of a vertex are a chain.
@@ -304,7 +351,7 @@ Surface colored_surface(const TriangleMesh& mesh, const ModelPlacement& placemen
 Result<std::string> write_glb(const TexturedMesh& textured, const GlbOptions& options) {
   TM_RETURN_IF_ERROR(options.placement.validate());
   TM_RETURN_IF_ERROR(check_mesh(textured));
-  tinygltf::Model model = empty_model(options);
+  GlbModel model = empty_model(options);
   const std::vector<Eigen::Vector3f> normals = unit_normals(textured.mesh);
   const std::vector<std::vector<std::uint32_t>> faces = faces_by_page(textured);
   VertexSplitter splitter(textured.mesh.positions.size());
@@ -319,16 +366,16 @@ Result<std::string> write_glb(const TexturedMesh& textured, const GlbOptions& op
     add_primitive(
         model, page_surface(textured, faces[page], normals, options.placement, splitter), material);
   }
-  return to_bytes(model);
+  return to_bytes(std::move(model));
 }
 
 Result<std::string> write_glb(const TriangleMesh& mesh, const GlbOptions& options) {
   TM_RETURN_IF_ERROR(options.placement.validate());
   TM_RETURN_IF_ERROR(check_mesh(mesh));
-  tinygltf::Model model = empty_model(options);
+  GlbModel model = empty_model(options);
   const int material = add_material(model, "surface", -1);
   add_primitive(model, colored_surface(mesh, options.placement), material);
-  return to_bytes(model);
+  return to_bytes(std::move(model));
 }
 
 }  // namespace trigmesh

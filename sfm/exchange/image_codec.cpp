@@ -61,6 +61,10 @@ struct JpegHandleCloser {
 
 using JpegHandle = std::unique_ptr<void, JpegHandleCloser>;
 
+struct JpegBytesFreer {
+  void operator()(unsigned char* bytes) const { tjFree(bytes); }
+};
+
 struct JpegHeader {
   ImageInfo info;
   int subsampling = 0;
@@ -361,24 +365,25 @@ Result<std::vector<std::uint8_t>> encode_jpeg(const cv::Mat& image, int quality)
   }
   const bool is_grey = image.type() == CV_8UC1;
   const int subsampling = is_grey ? TJSAMP_GRAY : TJSAMP_420;
-  unsigned long size = tjBufSize(image.cols, image.rows, subsampling);
-  std::vector<std::uint8_t> bytes(size);
-  unsigned char* out = bytes.data();
-  if (tjCompress2(handle.get(),
-                  image.data,
-                  image.cols,
-                  static_cast<int>(image.step[0]),
-                  image.rows,
-                  is_grey ? TJPF_GRAY : TJPF_RGB,
-                  &out,
-                  &size,
-                  subsampling,
-                  quality,
-                  TJFLAG_NOREALLOC | TJFLAG_ACCURATEDCT) != 0) {
+  // The encoder's own buffer grows with the file; the worst case would take more than the pixels.
+  unsigned long size = 0;
+  unsigned char* out = nullptr;
+  const int failed = tjCompress2(handle.get(),
+                                 image.data,
+                                 image.cols,
+                                 static_cast<int>(image.step[0]),
+                                 image.rows,
+                                 is_grey ? TJPF_GRAY : TJPF_RGB,
+                                 &out,
+                                 &size,
+                                 subsampling,
+                                 quality,
+                                 TJFLAG_ACCURATEDCT);
+  const std::unique_ptr<unsigned char, JpegBytesFreer> owner(out);
+  if (failed != 0) {
     return fail(ErrorCode::kInternal, "cannot encode JPEG: {}", tjGetErrorStr2(handle.get()));
   }
-  bytes.resize(size);
-  return bytes;
+  return std::vector<std::uint8_t>(out, out + size);
 }
 
 }  // namespace trigmesh

@@ -49,6 +49,7 @@ struct PixelSums {
 
 /// One view's picture with what is derived from it.
 struct ViewRasters {
+  std::uint32_t number = 0;
   cv::Mat rgb;
   cv::Mat mask;
   cv::Mat gradient;       // CV_8UC1
@@ -147,6 +148,7 @@ ViewRasters rasters_of(const TriangleMesh& mesh,
                        const ViewImage& image,
                        int silhouette_margin_px) {
   ViewRasters rasters{
+      .number = 0,
       .rgb = image.rgb,
       .mask = image.mask,
       .gradient = gradient_image(image.rgb),
@@ -178,48 +180,57 @@ FaceView face_view(std::uint32_t view, const PixelSums& sums, float quality) {
   return result;
 }
 
+/// Adds what a view sees of one face that looks at it.
+void look_at_face(const ProjectedFace& face,
+                  std::uint32_t number,
+                  double cosine,
+                  const ViewRasters& view,
+                  double min_view_cosine,
+                  ViewLooks& looks) {
+  const PixelBounds bounds{view.rgb.cols, view.rgb.rows};
+  if (!face.in_front) {
+    if (reaches_in(face, bounds)) {
+      looks.seen_in_part.push_back(number);
+    }
+    return;
+  }
+  const float area_px = -0.5F * doubled_area_px(face);
+  if (!(area_px > 0.0F)) {
+    return;
+  }
+  const bool in_picture = inside(face, bounds);
+  PixelSums sums = sum_pixels(view, face, bounds);
+  if (in_picture && sums.visible + sums.hidden + sums.masked == 0) {
+    sums = middle_pixel(view, face);
+  }
+  const bool whole = in_picture && sums.masked == 0 && sums.hidden == 0;
+  if (!whole && sums.visible >= kWorthSplittingPixels) {
+    looks.seen_in_part.push_back(number);
+  }
+  if (in_picture && sums.masked == 0 && sums.hidden <= std::min(sums.visible, kMostHiddenPixels)) {
+    const bool makeshift = !whole || cosine < min_view_cosine;
+    const float quality =
+        face_quality(sums, area_px, cosine) * (makeshift ? kMakeshiftQuality : 1.0F);
+    looks.seen.push_back({number, makeshift, face_view(view.number, sums, quality)});
+  }
+}
+
 ViewLooks look_from(const TriangleMesh& mesh,
                     const DenseView& view,
-                    std::uint32_t index,
+                    std::uint32_t number,
                     const ViewImage& image,
                     const VisibilityOptions& options) {
-  const PixelBounds bounds{view.camera.width_px, view.camera.height_px};
   const ProjectedMesh projected = project_mesh(mesh, view.camera, view.cam_from_world);
-  const ViewRasters rasters =
+  ViewRasters rasters =
       rasters_of(mesh, projected, view.camera, image, options.silhouette_margin_px);
+  rasters.number = number;
   const Eigen::Vector3d camera = camera_center(view.cam_from_world);
   ViewLooks looks;
   for (std::uint32_t f = 0; f < mesh.faces.size(); ++f) {
-    const ProjectedFace face = project_face(mesh, projected, f);
     const double cosine = view_cosine(mesh, f, camera);
-    if (cosine < kMakeshiftCosine) {
-      continue;
-    }
-    if (!face.in_front) {
-      if (reaches_in(face, bounds)) {
-        looks.seen_in_part.push_back(f);
-      }
-      continue;
-    }
-    const float area_px = -0.5F * doubled_area_px(face);
-    if (!(area_px > 0.0F)) {
-      continue;
-    }
-    const bool in_picture = inside(face, bounds);
-    PixelSums sums = sum_pixels(rasters, face, bounds);
-    if (in_picture && sums.visible + sums.hidden + sums.masked == 0) {
-      sums = middle_pixel(rasters, face);
-    }
-    const bool whole = in_picture && sums.masked == 0 && sums.hidden == 0;
-    if (!whole && sums.visible >= kWorthSplittingPixels) {
-      looks.seen_in_part.push_back(f);
-    }
-    if (in_picture && sums.masked == 0 &&
-        sums.hidden <= std::min(sums.visible, kMostHiddenPixels)) {
-      const bool makeshift = !whole || cosine < options.min_view_cosine;
-      const float quality =
-          face_quality(sums, area_px, cosine) * (makeshift ? kMakeshiftQuality : 1.0F);
-      looks.seen.push_back({f, makeshift, face_view(index, sums, quality)});
+    if (cosine >= kMakeshiftCosine) {
+      look_at_face(
+          project_face(mesh, projected, f), f, cosine, rasters, options.min_view_cosine, looks);
     }
   }
   return looks;

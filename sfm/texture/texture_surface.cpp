@@ -88,6 +88,22 @@ Result<SeenSurface> look_at_surface(const TriangleMesh& mesh,
   }
 }
 
+/// One view a face with few seams; kNoLabel where no view sees it.
+std::vector<std::uint32_t> choose_views(const FaceViews& faces,
+                                        const FaceNeighbors& neighbors,
+                                        std::size_t view_count,
+                                        const TextureOptions& options) {
+  const LabelingProblem problem =
+      make_labeling_problem(faces,
+                            neighbors,
+                            static_cast<std::uint32_t>(view_count),
+                            options.seam_cost,
+                            static_cast<std::size_t>(options.max_candidates));
+  std::vector<std::uint32_t> labels = label_faces(problem, options.labeling_sweeps);
+  absorb_small_charts(faces, neighbors, kSmallChartFaces, labels);
+  return labels;
+}
+
 /// Median over the textured faces of world length a texel.
 double median_texel_size(const TriangleMesh& mesh, const AtlasLayout& layout) {
   std::vector<double> sizes;
@@ -198,27 +214,20 @@ Result<TextureResult> texture_surface(const TriangleMesh& given_mesh,
 
   const std::vector<ColorGain> gains = estimate_view_gains(surface.seen, views.size());
   report_gains(gains, result.report);
-  std::vector<std::array<std::uint32_t, 3>> neighbors = face_neighbors(mesh);
+  const FaceNeighbors neighbors = face_neighbors(mesh);
   OutlierRejection agreed = reject_color_outliers(surface.seen, neighbors, gains, executor);
   surface.seen = {};
   result.report.rejected_look_count = agreed.rejected_count;
 
-  const LabelingProblem problem =
-      make_labeling_problem(agreed.faces,
-                            std::move(neighbors),
-                            static_cast<std::uint32_t>(views.size()),
-                            options.seam_cost,
-                            static_cast<std::size_t>(options.max_candidates));
-  std::vector<std::uint32_t> labels = label_faces(problem, options.labeling_sweeps);
-  absorb_small_charts(agreed.faces, problem.neighbors, kSmallChartFaces, labels);
+  const std::vector<std::uint32_t> labels =
+      choose_views(agreed.faces, neighbors, views.size(), options);
 
   TM_ASSIGN_OR_RETURN(
       AtlasLayout layout,
-      lay_out_atlas(
-          mesh, views, labels, connected_charts(labels, problem.neighbors), options.atlas));
+      lay_out_atlas(mesh, views, labels, connected_charts(labels, neighbors), options.atlas));
   report_layout(mesh, layout, options.atlas, result.report);
   TM_ASSIGN_OR_RETURN(std::vector<cv::Mat> pages, copy_pictures(layout, views, images, executor));
-  const SeamLeveling leveling = level_seams(mesh, problem.neighbors, layout, gains, pages);
+  const SeamLeveling leveling = level_seams(mesh, neighbors, layout, gains, pages);
   result.report.seam_step_before = leveling.step_before;
   result.report.seam_step_after_gains = leveling.step_after_gains;
   result.report.seam_step_after = leveling.step_after;
