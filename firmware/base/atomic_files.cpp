@@ -95,7 +95,7 @@ Result<> write_file_atomically(const fs::path& path,
   return write_file_atomically(real_file_system(), path, bytes, durability);
 }
 
-Result<> make_directory(FileSystem& files, const fs::path& path) {
+Result<> make_directory(FileSystem& files, const fs::path& path, Durability durability) {
   const fs::path folder = without_trailing_slash(path);
   const SystemResult<FileStatus> found = files.status(folder);
   if (found && found->kind == FileKind::kFile) {
@@ -109,13 +109,14 @@ Result<> make_directory(FileSystem& files, const fs::path& path) {
     return system_failure(reason, "cannot make the folder", path);
   }
   if (folder.has_parent_path() && folder.parent_path() != folder) {
-    TM_RETURN_IF_ERROR(make_directory(files, folder.parent_path()));
+    TM_RETURN_IF_ERROR(make_directory(files, folder.parent_path(), durability));
   }
   const SystemResult<> made = files.make_folder(folder);
   if (!made && made.error() != EEXIST) {
     return output_failure(system_error(made.error(), "cannot make the folder", path));
   }
-  return {};
+  return durability == Durability::kSynced ? sync_directory(files, folder.parent_path())
+                                           : Result<>();
 }
 
 Result<> make_directory(const fs::path& path) {

@@ -26,8 +26,11 @@ enum class Durability { kSynced, kCache };
                                              std::string_view bytes,
                                              Durability durability = Durability::kSynced);
 
-/// Makes the folder and its parents; no failure when it is there.
-[[nodiscard]] Result<> make_directory(FileSystem& files, const std::filesystem::path& path);
+/// Makes the folder and its parents; no failure when it is there. kSynced: those that were missing
+/// survive a power cut.
+[[nodiscard]] Result<> make_directory(FileSystem& files,
+                                      const std::filesystem::path& path,
+                                      Durability durability = Durability::kCache);
 [[nodiscard]] Result<> make_directory(const std::filesystem::path& path);
 
 /// Makes the names in this folder survive a power cut. Some file systems refuse fsync on folders

@@ -53,6 +53,7 @@ SystemResult<std::size_t> FaultyFileSystem::write(int fd, std::string_view bytes
   if (const int failed = next_call(Effect::kChanges); failed != 0) {
     return tl::unexpected(failed);
   }
+  write_calls_.push_back(calls_);
   if (power_cut_) {
     power_cut_->before_write(fd);
   }

@@ -51,6 +51,9 @@ class FaultyFileSystem final : public RealFileSystem {
 
   [[nodiscard]] std::size_t calls() const { return calls_; }
 
+  /// Which of them were writes; from 1.
+  [[nodiscard]] const std::vector<std::size_t>& write_calls() const { return write_calls_; }
+
   [[nodiscard]] SystemResult<int> open(const Path& path, OpenMode mode) override;
   [[nodiscard]] SystemResult<std::size_t> write(int fd, std::string_view bytes) override;
   [[nodiscard]] SystemResult<std::size_t> read(int fd, std::span<char> room) override;
@@ -78,6 +81,7 @@ class FaultyFileSystem final : public RealFileSystem {
   std::optional<PowerCut> power_cut_;
   std::optional<std::uint64_t> free_bytes_;
   std::size_t calls_ = 0;
+  std::vector<std::size_t> write_calls_;
 };
 
 }  // namespace trigmesh::test_support
