@@ -36,4 +36,27 @@ class SteadyClock final : public Clock {
   }
 };
 
+/// What people call the time, for names and manifests only: it may jump in either direction.
+/// Thread-safe.
+class WallClock {
+ public:
+  WallClock() = default;
+  WallClock(const WallClock&) = delete;
+  WallClock& operator=(const WallClock&) = delete;
+  WallClock(WallClock&&) = delete;
+  WallClock& operator=(WallClock&&) = delete;
+  virtual ~WallClock() = default;
+
+  /// Since 1970-01-01 00:00 UTC.
+  [[nodiscard]] virtual std::chrono::nanoseconds now() const = 0;
+};
+
+/// The machine's clock of the day.
+class SystemWallClock final : public WallClock {
+ public:
+  [[nodiscard]] std::chrono::nanoseconds now() const override {
+    return std::chrono::system_clock::now().time_since_epoch();
+  }
+};
+
 }  // namespace trigmesh

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "firmware/base/file_system.hpp"
 #include "firmware/base/result.hpp"
 
 namespace trigmesh {
@@ -15,6 +16,9 @@ namespace trigmesh {
 /// than `max_bytes`, kIo otherwise (a folder, permission, device); the message has the path and the
 /// system's reason. Never holds more than `max_bytes` and one block, even when the file grows.
 [[nodiscard]] Result<std::string> read_file(const std::filesystem::path& path,
+                                            std::size_t max_bytes);
+[[nodiscard]] Result<std::string> read_file(FileSystem& files,
+                                            const std::filesystem::path& path,
                                             std::size_t max_bytes);
 
 /// The same as bytes.

@@ -6,7 +6,7 @@
 #include <xxhash.h>
 
 #include "firmware/base/check.hpp"
-#include "firmware/pipeline/binary_stream.hpp"
+#include "firmware/base/binary_stream.hpp"
 #include "sfm/exchange/file_io.hpp"
 
 namespace trigmesh {

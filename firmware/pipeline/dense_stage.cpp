@@ -8,7 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "firmware/base/check.hpp"
-#include "firmware/pipeline/binary_stream.hpp"
+#include "firmware/base/binary_stream.hpp"
 #include "sfm/dense/depth_filter.hpp"
 #include "sfm/dense/fusion.hpp"
 #include "sfm/dense/undistortion.hpp"

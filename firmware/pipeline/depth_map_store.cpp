@@ -6,7 +6,7 @@
 #include <opencv2/core.hpp>
 
 #include "firmware/base/check.hpp"
-#include "firmware/pipeline/binary_stream.hpp"
+#include "firmware/base/binary_stream.hpp"
 
 namespace trigmesh {
 

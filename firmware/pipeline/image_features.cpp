@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "firmware/base/check.hpp"
-#include "firmware/pipeline/binary_stream.hpp"
+#include "firmware/base/binary_stream.hpp"
 #include "firmware/pipeline/checkpoint.hpp"
 #include "sfm/exchange/exif.hpp"
 #include "sfm/exchange/image_codec.hpp"

@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 
 #include "firmware/base/check.hpp"
-#include "firmware/pipeline/binary_stream.hpp"
+#include "firmware/base/binary_stream.hpp"
 #include "sfm/matching/pair_matching.hpp"
 
 namespace trigmesh {

@@ -18,7 +18,8 @@ Result<PhotoSet> open_photos(const std::string& input, Subfolders subfolders, Ma
   for (const RecordedFrame& frame : recording.frames()) {
     photos.names.push_back(frame.name);
   }
-  photos.ordered = recording.kind() == RecordingKind::kRecording &&
+  photos.ordered = (recording.kind() == RecordingKind::kRecording ||
+                    recording.kind() == RecordingKind::kSession) &&
                    recording.frames().front().timestamp.has_value();
   const auto masked = std::count_if(
       recording.frames().begin(), recording.frames().end(), [](const RecordedFrame& frame) {

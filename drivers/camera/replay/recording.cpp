@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 constexpr std::string_view kWhatIsAccepted =
     "give a folder of *.jpg, *.jpeg or *.png files, a text file that lists them one a line, or a "
     "recording (a folder "
-    "with images/)";
+    "with images/ or frames/)";
 
 /// By the extension, upper or lower case; nothing for files that are not pictures.
 std::optional<FrameFormat> format_of(const fs::path& path) {
@@ -89,7 +89,8 @@ Result<FolderContents> list_folder(const fs::path& folder, const RecordingOption
 /// to `ignored`.
 Result<FolderContents> order_by_time(FolderContents contents,
                                      const std::vector<TimestampRow>& rows,
-                                     const fs::path& images) {
+                                     const fs::path& images,
+                                     const fs::path& table) {
   FolderContents ordered;
   ordered.ignored = std::move(contents.ignored);
   std::map<std::string, FrameFormat, std::less<>> unlisted;
@@ -103,7 +104,7 @@ Result<FolderContents> order_by_time(FolderContents contents,
     if (!format) {
       return fail(ErrorCode::kCorruptData,
                   "{}: '{}' is not a *.jpg, *.jpeg or *.png file",
-                  (images.parent_path() / "timestamps.csv").string(),
+                  table.string(),
                   row.name);
     }
     ordered.frames.push_back({row.name, images / row.name, row.timestamp, *format, {}});
@@ -122,10 +123,11 @@ Result<FolderContents> order_by_time(FolderContents contents,
   return ordered;
 }
 
-Result<FolderContents> list_recording(const fs::path& folder, const RecordingOptions& options) {
-  const fs::path images = folder / "images";
+/// Pictures in `images`, their times in `table` if there is one.
+Result<FolderContents> list_recording(const fs::path& images,
+                                      const fs::path& table,
+                                      const RecordingOptions& options) {
   TM_ASSIGN_OR_RETURN(FolderContents contents, list_folder(images, options));
-  const fs::path table = folder / "timestamps.csv";
   std::error_code error;
   if (!fs::exists(table, error)) {
     return contents;
@@ -133,7 +135,7 @@ Result<FolderContents> list_recording(const fs::path& folder, const RecordingOpt
   TM_ASSIGN_OR_RETURN(const std::string text, read_file(table, options.max_table_bytes));
   TM_ASSIGN_OR_RETURN(const std::vector<TimestampRow> rows,
                       parse_timestamps(text, table.string(), options.max_frames));
-  return order_by_time(std::move(contents), rows, images);
+  return order_by_time(std::move(contents), rows, images, table);
 }
 
 Result<FolderContents> list_from_file(const fs::path& list, const RecordingOptions& options) {
@@ -185,7 +187,10 @@ Result<RecordingKind> kind_of(const fs::path& input) {
   if (status.type() != fs::file_type::directory) {
     return RecordingKind::kListFile;
   }
-  return fs::is_directory(input / "images", error) ? RecordingKind::kRecording
+  if (fs::is_directory(input / "images", error)) {
+    return RecordingKind::kRecording;
+  }
+  return fs::is_directory(input / "frames", error) ? RecordingKind::kSession
                                                    : RecordingKind::kPhotoFolder;
 }
 
@@ -211,6 +216,8 @@ std::string_view to_string(RecordingKind kind) {
       return "list file";
     case RecordingKind::kRecording:
       return "recording";
+    case RecordingKind::kSession:
+      return "session";
   }
   return "unknown";
 }
@@ -223,7 +230,9 @@ Result<Recording> Recording::open(const fs::path& input, const RecordingOptions&
   Result<FolderContents> contents = [&] {
     switch (recording.kind_) {
       case RecordingKind::kRecording:
-        return list_recording(input, options);
+        return list_recording(input / "images", input / "timestamps.csv", options);
+      case RecordingKind::kSession:
+        return list_recording(input / "frames", input / "frames.csv", options);
       case RecordingKind::kListFile:
         return list_from_file(input, options);
       case RecordingKind::kPhotoFolder:

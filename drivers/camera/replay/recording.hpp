@@ -39,9 +39,10 @@ enum class RecordingKind {
   kListFile,     ///< a text file with one path a line, relative to the list file; the order of the
                  ///< lines
   kRecording,    ///< a folder with images/ and perhaps timestamps.csv; the order of the timestamps
+  kSession,      ///< a folder with frames/ and perhaps frames.csv, which the rig writes; the same
 };
 
-/// "photo folder", "list file", "recording".
+/// "photo folder", "list file", "recording", "session".
 [[nodiscard]] std::string_view to_string(RecordingKind kind);
 
 /// One picture of a recording, not yet read.
@@ -62,7 +63,7 @@ class Recording {
  public:
   /// Finds out what `input` is and lists its frames. kNotFound: no such path, or no pictures in it
   /// (says where was looked); kIo: not readable; kCorruptData: a bad line in a list file or
-  /// timestamps.csv (names file and line); kLimitExceeded: more frames or bytes than the options
+  /// table (names file and line); kLimitExceeded: more frames or bytes than the options
   /// allow; kUnsupported: a file that is not a list.
   [[nodiscard]] static Result<Recording> open(const std::filesystem::path& input,
                                               const RecordingOptions& options = {});
@@ -74,7 +75,7 @@ class Recording {
   [[nodiscard]] const std::vector<RecordedFrame>& frames() const { return frames_; }
 
   /// Names of files in the image folder that are not used: not *.jpg, *.jpeg or *.png, or not in
-  /// timestamps.csv; sorted.
+  /// the table; sorted.
   [[nodiscard]] const std::vector<std::string>& ignored() const { return ignored_; }
 
   /// Reads one picture. Precondition: index < size(). kNotFound, kIo, kLimitExceeded; kCorruptData

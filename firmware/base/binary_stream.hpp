@@ -4,14 +4,17 @@
 #include <cstdint>
 #include <cstring>
 #include <span>
+#include <string>
+#include <string_view>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "firmware/base/result.hpp"
 
 namespace trigmesh {
 
-static_assert(std::endian::native == std::endian::little, "checkpoints are stored little endian");
+static_assert(std::endian::native == std::endian::little, "values are stored little endian");
 
 /// A type whose bytes are its value.
 template <typename T>
@@ -31,15 +34,18 @@ class BinaryWriter {
     append(v.data(), v.size() * sizeof(T));
   }
 
+  /// u64 length, then the characters.
+  void text(std::string_view characters) {
+    value(static_cast<std::uint64_t>(characters.size()));
+    append(characters.data(), characters.size());
+  }
+
   [[nodiscard]] std::vector<std::uint8_t> take() { return std::move(bytes_); }
 
  private:
   void append(const void* data, std::size_t size) {
-    const std::size_t at = bytes_.size();
-    bytes_.resize(at + size);
-    if (size > 0) {
-      std::memcpy(bytes_.data() + at, data, size);
-    }
+    const auto* bytes = static_cast<const std::uint8_t*>(data);
+    bytes_.insert(bytes_.end(), bytes, bytes + size);
   }
 
   std::vector<std::uint8_t> bytes_;
@@ -69,6 +75,11 @@ class BinaryReader {
     std::vector<T> v(static_cast<std::size_t>(count));
     copy(v.data(), v.size() * sizeof(T));
     return v;
+  }
+
+  [[nodiscard]] std::string text() {
+    const std::vector<char> characters = items<char>();
+    return {characters.begin(), characters.end()};
   }
 
   /// Everything so far was there.

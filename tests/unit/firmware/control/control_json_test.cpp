@@ -1,0 +1,53 @@
+#include "firmware/control/control_json.hpp"
+
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace trigmesh {
+namespace {
+
+TEST(ControlJson, SaysWhatTheRigDoes) {
+  ControlStatus status;
+  status.phase = RigPhase::kCapturing;
+  status.camera_present = true;
+  status.storage = StorageLevel::kLow;
+  status.session_id = "20240229T235959Z-00ff00";
+  status.frames = 3;
+  status.job = JobState::kPaused;
+  status.queued_models = 1;
+  status.available_bytes = 5;
+  status.software_version = "1.0";
+  EXPECT_EQ(render_status(status),
+            R"({"phase":"capturing","camera_present":true,"storage":"low",)"
+            R"("session":"20240229T235959Z-00ff00","frames":3,"job":"paused","queued_models":1,)"
+            R"("available_bytes":5,"software_version":"1.0"})");
+}
+
+TEST(ControlJson, ListsSessions) {
+  SessionInfo session;
+  session.manifest.id = "20240229T235959Z-00ff00";
+  session.manifest.state = SessionState::kModelReady;
+  session.manifest.mode = "still";
+  session.manifest.frame_count = 12;
+  session.has_model = true;
+  session.size_bytes = 99;
+  EXPECT_EQ(render_sessions(std::vector{session}),
+            R"([{"id":"20240229T235959Z-00ff00","state":"model_ready","mode":"still","frames":12,)"
+            R"("has_model":true,"exported":false,"size_bytes":99}])");
+  EXPECT_EQ(render_sessions({}), "[]");
+}
+
+TEST(ControlJson, KeepsErrorsOnOneLine) {
+  EXPECT_EQ(render_error("a \"b\"\nc"), R"({"error":"a \"b\"\nc"})");
+}
+
+TEST(ControlJson, TellsACallerWhatHeCanDo) {
+  EXPECT_EQ(http_status_of(ErrorCode::kNotFound), 404);
+  EXPECT_EQ(http_status_of(ErrorCode::kInsufficientData), 409);
+  EXPECT_EQ(http_status_of(ErrorCode::kNoSpace), 507);
+  EXPECT_EQ(http_status_of(ErrorCode::kIo), 500);
+}
+
+}  // namespace
+}  // namespace trigmesh
