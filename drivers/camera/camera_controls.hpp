@@ -56,14 +56,16 @@ class CameraControls {
   /// kControlRefused: the camera has no such control.
   [[nodiscard]] virtual DeviceResult<std::int64_t> get(ControlId id) = 0;
 
-  /// Sets and reads back; returns what the camera took, which may be the nearest of its steps.
-  /// kControlRefused: no such control, out of range, or another value came back.
+  /// Sets and reads back; returns what the camera took, which may be a step of its own beside
+  /// `value`. kControlRefused: no such control, out of range, or an automatism that did not switch.
   [[nodiscard]] virtual DeviceResult<std::int64_t> set(ControlId id, std::int64_t value) = 0;
 
-  /// Holds for a session what the camera chose by itself: each automatism that is on goes off, and
-  /// the value it had is written and read back. `wanted` comes first and replaces what the camera
-  /// chose. Returns the values that hold now. Controls that the camera does not have are left out;
-  /// kControlRefused when it has one and does not keep it.
+  /// Holds for a session what the camera chose by itself: each automatism goes off, and the value
+  /// it had is written and read back. A value in `wanted` replaces what the camera chose. Returns
+  /// what holds now, in the order of ControlId; controls that the camera does not have are left
+  /// out. It lasts until the next lock(): a camera that comes back is set to it by start().
+  /// kControlRefused: an automatism stays on, a value is out of range, or `wanted` names a control
+  /// that the camera does not have or an automatism.
   [[nodiscard]] virtual DeviceResult<std::vector<ControlValue>> lock(
       const std::vector<ControlValue>& wanted) = 0;
 

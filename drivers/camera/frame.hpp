@@ -33,6 +33,7 @@ enum class FrameMoment : std::uint8_t {
   kExposureMiddle,  ///< of the exposure, as recordings have it
   kExposureStart,   ///< the exposure began, or the first byte left the sensor
   kFrameEnd,        ///< the last byte has arrived: the exposure lies before it
+  kReceived,        ///< we took it from the driver, which stamped nothing that can be believed
 };
 
 /// What is known of a frame besides its bytes.

@@ -7,6 +7,7 @@
 
 #include "drivers/camera/mock/mock_source.hpp"
 #include "drivers/camera/replay/replay_source.hpp"
+#include "drivers/camera/v4l2/v4l2_source.hpp"
 #include "tests/conformance/camera_backend.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -60,12 +61,30 @@ std::unique_ptr<FrameSource> make_replay(const CameraWish& wish) {
   return *std::move(source);
 }
 
+void add_v4l2(CameraBackends& backends) {
+  const char* device = std::getenv("TRIGMESH_TEST_V4L2");
+  if (device == nullptr) {
+    backends.skipped.emplace_back("v4l2: TRIGMESH_TEST_V4L2 names no device");
+    return;
+  }
+  const auto make = [name = std::string(device)](const CameraWish&) {
+    V4l2Options options;
+    options.camera = name;
+    auto source = V4l2Source::create(options, std::make_shared<LinuxKernel>(), kClock);
+    EXPECT_TRUE(source) << source.error().message;
+    return std::unique_ptr<FrameSource>(*std::move(source));
+  };
+  backends.running.push_back(
+      {.name = "v4l2", .is_scripted = false, .loses_frames = true, .make = make});
+}
+
 CameraBackends find_backends() {
   CameraBackends backends;
   backends.running.push_back(
       {.name = "replay", .is_scripted = true, .loses_frames = false, .make = make_replay});
   backends.running.push_back(
       {.name = "mock", .is_scripted = true, .loses_frames = true, .make = make_mock});
+  add_v4l2(backends);
   return backends;
 }
 
