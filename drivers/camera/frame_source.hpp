@@ -9,14 +9,12 @@
 #include "drivers/camera/camera_controls.hpp"
 #include "drivers/camera/frame.hpp"
 #include "drivers/device/device_fault.hpp"
+#include "drivers/device/wake_event.hpp"
 
 namespace trigmesh {
 
 /// There are no more frames: the end of a recording. A camera has none.
 struct EndOfFrames {};
-
-/// request_stop() ended the wait.
-struct WaitStopped {};
 
 /// What one wait brought: exactly one of these.
 using FrameEvent = std::variant<Frame, EndOfFrames, WaitStopped, DeviceFault>;

@@ -11,6 +11,9 @@
 
 namespace trigmesh {
 
+/// request_stop() ended the wait for a device.
+struct WaitStopped {};
+
 /// A flag that a blocked wait can poll: set by one thread, seen at once by another. Thread-safe.
 class WakeEvent {
  public:

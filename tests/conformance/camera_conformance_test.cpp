@@ -189,11 +189,14 @@ TEST_P(CameraConformance, TakesNoMemoryInSteadyState) {
   for (int i = 0; i < kWarmUp; ++i) {
     ASSERT_FALSE(next(*source).empty());
   }
-  const std::uint64_t before = allocations_of_this_thread();
+  const std::optional<std::uint64_t> before = allocations_of_this_thread();
+  if (!before) {
+    GTEST_SKIP() << "the sanitizer of this build has replaced operator new";
+  }
   for (int i = 0; i < kMeasured; ++i) {
     ASSERT_FALSE(next(*source).empty());
   }
-  EXPECT_EQ(allocations_of_this_thread() - before, 0U);
+  EXPECT_EQ(allocations_of_this_thread(), before);
 }
 
 INSTANTIATE_TEST_SUITE_P(Backends,

@@ -7,6 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/support/manual_clock.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace trigmesh {
@@ -16,14 +17,6 @@ namespace fs = std::filesystem;
 using std::chrono::milliseconds;
 using std::chrono::nanoseconds;
 using ::testing::HasSubstr;
-
-/// Stands still unless told.
-class ManualClock final : public Clock {
- public:
-  [[nodiscard]] nanoseconds now() const override { return time; }
-
-  nanoseconds time{1000};
-};
 
 class ReplaySourceTest : public ::testing::Test {
  protected:
@@ -57,7 +50,7 @@ class ReplaySourceTest : public ::testing::Test {
 
   const test_support::TemporaryFolder temporary_;
   const fs::path root_ = temporary_.path();
-  ManualClock clock_;
+  test_support::ManualClock clock_;
 };
 
 TEST_F(ReplaySourceTest, DeliversBytesNamesAndTimesAsRecorded) {

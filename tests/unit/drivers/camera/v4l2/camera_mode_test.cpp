@@ -65,7 +65,7 @@ TEST(Fourcc, GoesThereAndBack) {
 }
 
 TEST(ListModes, AsksForSizesAndTheNearestRate) {
-  test_support::FakeTime time;
+  test_support::ManualClock time;
   test_support::FakeKernel kernel(time);
   kernel.formats = {{V4L2_PIX_FMT_H264, {{1280, 720, {{1, 30}}}}},
                     {V4L2_PIX_FMT_MJPEG, {{1280, 720, {{1, 60}, {1, 25}}}, {640, 480, {}}}}};
@@ -76,7 +76,7 @@ TEST(ListModes, AsksForSizesAndTheNearestRate) {
 }
 
 TEST(ListModes, TriesTheWishWhereNoSizesAreTold) {
-  test_support::FakeTime time;
+  test_support::ManualClock time;
   test_support::FakeKernel kernel(time);
   kernel.formats = {{V4L2_PIX_FMT_YUYV, {}}};
   const int fd = kernel.open("/dev/video0");

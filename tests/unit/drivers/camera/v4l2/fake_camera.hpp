@@ -52,7 +52,7 @@ class FakeCameraTest : public ::testing::Test {
     return fault != nullptr ? fault->kind : FaultKind::kNotStarted;
   }
 
-  FakeTime time_;
+  ManualClock time_;
   std::shared_ptr<FakeKernel> kernel_ = std::make_shared<FakeKernel>(time_);
 };
 

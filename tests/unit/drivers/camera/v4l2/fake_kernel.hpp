@@ -15,17 +15,9 @@
 #include <linux/videodev2.h>
 
 #include "drivers/camera/v4l2/kernel.hpp"
-#include "firmware/base/clock.hpp"
+#include "tests/support/manual_clock.hpp"
 
 namespace trigmesh::test_support {
-
-/// The clock of the fake kernel: stands still unless told.
-class FakeTime final : public Clock {
- public:
-  [[nodiscard]] std::chrono::nanoseconds now() const override { return time; }
-
-  std::chrono::nanoseconds time = std::chrono::seconds(100);
-};
 
 /// One size of a format of the fake camera.
 struct FakeSize {
@@ -63,7 +55,7 @@ struct FakeFrame {
 /// and buffers, and fails where a test says so.
 class FakeKernel final : public Kernel {
  public:
-  explicit FakeKernel(FakeTime& time) : time_(time) {}
+  explicit FakeKernel(ManualClock& time) : time_(time) {}
 
   // ---- what a test sets up
   std::vector<FakeFormat> formats;
@@ -116,7 +108,7 @@ class FakeKernel final : public Kernel {
   [[nodiscard]] int query_control(v4l2_queryctrl& query) const;
   [[nodiscard]] int set_control(const v4l2_control& control);
 
-  FakeTime& time_;
+  ManualClock& time_;
   int next_fd_ = 1000;
   std::vector<std::unique_ptr<std::vector<std::uint8_t>>> memory_;   // of the stream that runs
   std::vector<std::unique_ptr<std::vector<std::uint8_t>>> orphans_;  // of those before it

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <chrono>
+
+#include "firmware/base/clock.hpp"
+
+namespace trigmesh::test_support {
+
+/// Stands still unless a test moves it.
+class ManualClock final : public Clock {
+ public:
+  [[nodiscard]] std::chrono::nanoseconds now() const override { return time; }
+
+  std::chrono::nanoseconds time = std::chrono::seconds(100);
+};
+
+}  // namespace trigmesh::test_support
