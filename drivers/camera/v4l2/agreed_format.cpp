@@ -29,8 +29,10 @@ DeviceResult<std::chrono::nanoseconds> agree_on_rate(Kernel& kernel,
   parameters.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
   v4l2_fract& wanted = parameters.parm.capture.timeperframe;
   constexpr std::int64_t kUnitsPerSecond = 10'000'000;  // of 100 ns, as UVC counts
-  wanted.numerator =
-      static_cast<__u32>(std::clamp<std::int64_t>(interval.count() / 100, 1, 1 << 30));
+  // Rounded up: drivers that look for the first interval that is not longer would take the next
+  // one.
+  const std::int64_t units = (interval.count() + 99) / 100;
+  wanted.numerator = static_cast<__u32>(std::clamp<std::int64_t>(units, 1, 1 << 30));
   wanted.denominator = static_cast<__u32>(kUnitsPerSecond);
   const int status = kernel.ioctl(fd, VIDIOC_S_PARM, &parameters);
   if (status == -EINVAL || status == -ENOTTY) {

@@ -36,6 +36,14 @@ TEST_F(V4l2SourceTest, DeliversFramesInTheMemoryOfTheDriver) {
   EXPECT_EQ(kernel_->poll_count, 0U) << "frames that are ready need no poll";
 }
 
+TEST_F(V4l2SourceTest, AsksForARateThatIsNotBeyondTheModes) {
+  const auto source = make();
+  ASSERT_TRUE(source->start());
+  EXPECT_EQ(kernel_->interval.numerator, 333'334U) << "not shorter than a thirtieth";
+  EXPECT_EQ(kernel_->interval.denominator, 10'000'000U);
+  EXPECT_EQ(source->info().frame_interval, std::chrono::nanoseconds(33'333'400));
+}
+
 TEST_F(V4l2SourceTest, TimesOutAndGoesOn) {
   const auto source = make();
   ASSERT_TRUE(source->start());
