@@ -4,8 +4,12 @@
 set(suites
   release/tests                       # all
   fuzz/tests/unit                     # unit tests, address and undefined sanitizers, clang
+  fuzz/tests/conformance              # the same, all backends of the drivers
   fuzz/tests/fuzz                     # every fuzz target for TRIGMESH_FUZZ_SECONDS
-  tsan/tests/unit/firmware/base       # threads
+  tsan/tests/conformance              # threads
+  tsan/tests/unit/drivers/camera
+  tsan/tests/unit/drivers/trigger
+  tsan/tests/unit/firmware/base
   tsan/tests/unit/firmware/pipeline)
 set(content "# Written by tests/suites.cmake.\n")
 foreach(suite IN LISTS suites)

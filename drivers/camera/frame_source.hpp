@@ -3,38 +3,54 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <string>
-#include <vector>
+#include <variant>
 
-#include "firmware/base/result.hpp"
+#include "drivers/camera/camera_controls.hpp"
+#include "drivers/camera/frame.hpp"
+#include "drivers/device/device_fault.hpp"
+#include "drivers/device/wake_event.hpp"
 
 namespace trigmesh {
 
-/// How the bytes of a frame are encoded.
-enum class FrameFormat { kJpeg, kPng };
+/// There are no more frames: the end of a recording. A camera has none.
+struct EndOfFrames {};
 
-/// One picture as the sensor or the file gave it: still encoded, so that whoever has time decodes
-/// it and so that a recording keeps the bytes untouched.
-struct Frame {
-  std::size_t index = 0;  ///< position in the sequence, from 0
-  std::string
-      name;  ///< file name relative to the image folder, '/' as separator; unique in the sequence
-  /// Middle of the exposure on the clock of the recording; absent for plain photographs.
-  std::optional<std::chrono::nanoseconds> timestamp;
-  FrameFormat format = FrameFormat::kJpeg;
-  std::vector<std::uint8_t> bytes;
+/// What one wait brought: exactly one of these.
+using FrameEvent = std::variant<Frame, EndOfFrames, WaitStopped, DeviceFault>;
+
+/// What a source turned out to be.
+struct SourceInfo {
+  /// What finds it again after it was unplugged: a name that does not depend on the order in which
+  /// devices appeared. Recordings: their path.
+  std::string stable_name;
+  std::string model;   ///< as it calls itself
+  FrameLayout layout;  ///< what start() agreed on; encoded without size when frames may differ
+  std::chrono::nanoseconds frame_interval{0};  ///< 0: not known
+  std::size_t buffer_count = 0;  ///< frames that may be held at once before the source starves
+};
+
+/// What happened since the source was made.
+struct FrameCounters {
+  std::uint64_t frames = 0;  ///< delivered
+  std::uint64_t missed = 0;  ///< lost before they reached us, by sequence numbers
+  FaultCounters faults;
 };
 
 /// Where frames come from: a camera, a folder of photographs, a recorded session. Used as
 ///
+///     TM_RETURN_IF_FAULT(source.start());
 ///     while (true) {
-///       TM_ASSIGN_OR_RETURN(std::optional<Frame> frame, source.next());
-///       if (!frame) break;            // the end
-///       use(*frame);
+///       FrameEvent event = source.wait(2s);
+///       if (auto* frame = std::get_if<Frame>(&event)) { use(std::move(*frame)); continue; }
+///       if (auto* fault = std::get_if<DeviceFault>(&event)) { act on fault_policy(fault->kind) }
+///       else break;                                  // the end, or asked to stop
 ///     }
+///     source.stop();
 ///
-/// Thread-compatible: one thread calls next().
+/// Threads: one thread at a time calls start, wait, stop and the rest. request_stop() may be called
+/// from any thread at any time, and frames may be released on any thread at any time, also after
+/// the source is gone. In steady state wait() takes no memory from the heap.
 class FrameSource {
  public:
   FrameSource() = default;
@@ -44,10 +60,32 @@ class FrameSource {
   FrameSource& operator=(FrameSource&&) = delete;
   virtual ~FrameSource() = default;
 
-  /// The next frame in capture order; nothing at the end. An Error concerns this frame only when
-  /// its code is kIo, kNotFound, kCorruptData or kLimitExceeded: calling again goes on with the
-  /// frame after it.
-  [[nodiscard]] virtual Result<std::optional<Frame>> next() = 0;
+  /// Opens the device and lets it run; a recording begins at its first frame. Nothing happens when
+  /// it runs already. After a fault it is as before: stopped, with nothing open.
+  [[nodiscard]] virtual DeviceResult<> start() = 0;
+
+  /// Ends the stream and closes the device; frames that are out stay readable. Forgets a
+  /// request_stop(). Nothing happens when it does not run.
+  virtual void stop() = 0;
+
+  /// The next frame in capture order, or why there is none. A fault concerns this frame alone when
+  /// its policy is kContinue, or says that nothing came in time (kTimeout): waiting again goes on.
+  /// After any other fault every wait says kNotStarted until stop() and start().
+  /// A frame that is ready is delivered also when `timeout` is 0. When all buffers are out, a
+  /// camera loses frames, and a recording waits.
+  [[nodiscard]] virtual FrameEvent wait(std::chrono::nanoseconds timeout) = 0;
+
+  /// Ends a wait in another thread at once, and all later ones, until stop(). Thread-safe.
+  virtual void request_stop() noexcept = 0;
+
+  /// Complete after start(); before it, what is known.
+  [[nodiscard]] virtual SourceInfo info() const = 0;
+
+  [[nodiscard]] virtual FrameCounters counters() const = 0;
+
+  /// Exposure, gain and the like; nullptr when there is nothing to control. Valid until the source
+  /// goes; its calls need a started source.
+  [[nodiscard]] virtual CameraControls* controls() { return nullptr; }
 };
 
 }  // namespace trigmesh

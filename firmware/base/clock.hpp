@@ -17,9 +17,6 @@ class Clock {
 
   /// Monotonic time since an arbitrary start.
   [[nodiscard]] virtual std::chrono::nanoseconds now() const = 0;
-
-  /// Processor time that all threads of the process have used so far.
-  [[nodiscard]] virtual std::chrono::nanoseconds cpu_time() const = 0;
 };
 
 /// The machine's monotonic clock.
@@ -28,8 +25,12 @@ class SteadyClock final : public Clock {
   [[nodiscard]] std::chrono::nanoseconds now() const override {
     return std::chrono::steady_clock::now().time_since_epoch();
   }
+};
 
-  [[nodiscard]] std::chrono::nanoseconds cpu_time() const override {
+/// Processor time that all threads of the process have used so far.
+class ProcessCpuClock final : public Clock {
+ public:
+  [[nodiscard]] std::chrono::nanoseconds now() const override {
     timespec used{};
     ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &used);
     return std::chrono::seconds(used.tv_sec) + std::chrono::nanoseconds(used.tv_nsec);

@@ -19,12 +19,12 @@ struct StageTime {
 class Stopwatch {
  public:
   explicit Stopwatch(const Clock& clock)
-      : clock_(&clock), last_(clock.now()), last_cpu_(clock.cpu_time()) {}
+      : clock_(&clock), last_(clock.now()), last_cpu_(cpu_clock_.now()) {}
 
   /// The time since the stage before ended belongs to `stage`.
   void finish(Stage stage) {
     const auto now = clock_->now();
-    const auto cpu = clock_->cpu_time();
+    const auto cpu = cpu_clock_.now();
     times_.push_back({stage, now - last_, cpu - last_cpu_});
     last_ = now;
     last_cpu_ = cpu;
@@ -34,6 +34,7 @@ class Stopwatch {
 
  private:
   const Clock* clock_;
+  ProcessCpuClock cpu_clock_;
   std::chrono::nanoseconds last_;
   std::chrono::nanoseconds last_cpu_;
   std::vector<StageTime> times_;

@@ -6,26 +6,20 @@
 
 namespace trigmesh::test_support {
 
-/// Time goes on when the test says so.
+/// Stands still unless a test moves it.
 class ManualClock final : public Clock {
  public:
-  [[nodiscard]] std::chrono::nanoseconds now() const override { return now_; }
+  [[nodiscard]] std::chrono::nanoseconds now() const override { return time; }
 
-  void set(std::chrono::nanoseconds now) { now_ = now; }
-
- private:
-  std::chrono::nanoseconds now_{};
+  std::chrono::nanoseconds time = std::chrono::seconds(100);
 };
 
 /// The same for the time of day.
 class ManualWallClock final : public WallClock {
  public:
-  [[nodiscard]] std::chrono::nanoseconds now() const override { return now_; }
+  [[nodiscard]] std::chrono::nanoseconds now() const override { return time; }
 
-  void set(std::chrono::nanoseconds now) { now_ = now; }
-
- private:
-  std::chrono::nanoseconds now_{};
+  std::chrono::nanoseconds time{};
 };
 
 }  // namespace trigmesh::test_support

@@ -44,7 +44,11 @@ function(trigmesh_add_library)
 endfunction()
 
 # Names of tests tell the sanitizer, so that several builds can be run as one (tests/suites.cmake).
-set(threads_folder "${CMAKE_SOURCE_DIR}/tests/unit/firmware")
+set(thread_folders
+  "${CMAKE_SOURCE_DIR}/tests/conformance"
+  "${CMAKE_SOURCE_DIR}/tests/unit/drivers/camera"
+  "${CMAKE_SOURCE_DIR}/tests/unit/drivers/trigger"
+  "${CMAKE_SOURCE_DIR}/tests/unit/firmware")
 set(test_prefix "")
 if(TRIGMESH_SANITIZE MATCHES "address")
   set(test_prefix "asan.")
@@ -69,12 +73,14 @@ function(trigmesh_add_test)
   endif()
   add_executable(${ARG_NAME} ${ARG_SOURCES})
   target_link_libraries(${ARG_NAME} PRIVATE ${ARG_LIBRARIES} GTest::gmock GTest::gtest_main trigmesh_compile_options)
-  if("${ARG_LABEL}" STREQUAL "unit")
+  if("${ARG_LABEL}" MATCHES "^(unit|conformance)$")
     add_dependencies(trigmesh_unit_tests ${ARG_NAME})
-    cmake_path(IS_PREFIX threads_folder "${CMAKE_CURRENT_SOURCE_DIR}" has_threads)
-    if(has_threads)
-      add_dependencies(trigmesh_thread_tests ${ARG_NAME})
-    endif()
+    foreach(folder IN LISTS thread_folders)
+      cmake_path(IS_PREFIX folder "${CMAKE_CURRENT_SOURCE_DIR}" has_threads)
+      if(has_threads)
+        add_dependencies(trigmesh_thread_tests ${ARG_NAME})
+      endif()
+    endforeach()
   endif()
   gtest_discover_tests(${ARG_NAME} DISCOVERY_MODE PRE_TEST TEST_PREFIX "${test_prefix}"
                        PROPERTIES LABELS "${ARG_LABEL}" TIMEOUT ${ARG_TIMEOUT})

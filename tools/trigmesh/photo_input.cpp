@@ -30,10 +30,7 @@ Result<PhotoSet> open_photos(const std::string& input, Subfolders subfolders, Ma
       path.has_filename() ? path.filename() : path.parent_path().filename();
   photos.description = fmt::format(
       "{}: {}, {} photographs", name.string(), to_string(recording.kind()), recording.size());
-  photos.read = [recording](std::size_t i) -> Result<std::vector<std::uint8_t>> {
-    TM_ASSIGN_OR_RETURN(Frame frame, recording.frame(i));
-    return std::move(frame.bytes);
-  };
+  photos.read = [recording](std::size_t i) { return recording.read(i); };
   if (masks == MaskUse::kUse && masked > 0) {
     photos.description += fmt::format(", {} with a mask", masked);
     photos.read_mask = [recording](std::size_t i) { return recording.mask(i); };

@@ -1,13 +1,12 @@
 #include "drivers/camera/replay/frame_tables.hpp"
 
-#include <charconv>
 #include <cstdint>
 #include <limits>
 #include <optional>
 #include <set>
-#include <system_error>
 #include <utility>
 
+#include "drivers/device/text_lines.hpp"
 #include "firmware/base/check.hpp"
 
 namespace trigmesh {
@@ -18,41 +17,6 @@ constexpr std::size_t kMaxLineBytes = 4096;
 bool is_digit(char c) {
   return c >= '0' && c <= '9';
 }
-
-/// Takes lines off a text one by one and counts them.
-class LineCursor {
- public:
-  explicit LineCursor(std::string_view text) : rest_(text) {
-    constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
-    if (rest_.substr(0, kByteOrderMark.size()) == kByteOrderMark) {
-      rest_.remove_prefix(kByteOrderMark.size());
-    }
-  }
-
-  /// False at the end of the text.
-  [[nodiscard]] bool advance() {
-    if (rest_.empty()) {
-      return false;
-    }
-    const std::size_t end = rest_.find('\n');
-    line_ = rest_.substr(0, end);
-    rest_.remove_prefix(end == std::string_view::npos ? rest_.size() : end + 1);
-    if (!line_.empty() && line_.back() == '\r') {
-      line_.remove_suffix(1);
-    }
-    ++number_;
-    return true;
-  }
-
-  [[nodiscard]] std::string_view line() const { return line_; }
-
-  [[nodiscard]] std::size_t number() const { return number_; }
-
- private:
-  std::string_view rest_;
-  std::string_view line_;
-  std::size_t number_ = 0;
-};
 
 bool has_control_character(std::string_view text) {
   for (const char c : text) {
@@ -80,14 +44,6 @@ std::optional<TimeColumn> time_column(std::string_view header) {
     return TimeColumn::kNanoseconds;
   }
   return unit == "timestamp_s" ? std::optional(TimeColumn::kSeconds) : std::nullopt;
-}
-
-std::optional<std::int64_t> whole_number(std::string_view text) {
-  std::int64_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  const bool whole =
-      error == std::errc{} && end == text.data() + text.size() && is_digit(text.front());
-  return whole ? std::optional(value) : std::nullopt;
 }
 
 /// Seconds with up to nine decimals, exactly: no floating point.

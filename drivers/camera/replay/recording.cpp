@@ -6,6 +6,7 @@
 #include <system_error>
 #include <utility>
 
+#include "drivers/camera/replay/file_buffer.hpp"
 #include "drivers/camera/replay/frame_tables.hpp"
 #include "firmware/base/check.hpp"
 #include "firmware/base/file_bytes.hpp"
@@ -21,16 +22,16 @@ constexpr std::string_view kWhatIsAccepted =
     "with images/ or frames/)";
 
 /// By the extension, upper or lower case; nothing for files that are not pictures.
-std::optional<FrameFormat> format_of(const fs::path& path) {
+std::optional<PixelFormat> format_of(const fs::path& path) {
   std::string extension = path.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) {
     return static_cast<char>(std::tolower(c));
   });
   if (extension == ".jpg" || extension == ".jpeg") {
-    return FrameFormat::kJpeg;
+    return PixelFormat::kJpeg;
   }
   if (extension == ".png") {
-    return FrameFormat::kPng;
+    return PixelFormat::kPng;
   }
   return std::nullopt;
 }
@@ -61,7 +62,7 @@ Result<FolderContents> list_folder(const fs::path& folder, const RecordingOption
       continue;  // its files follow
     }
     entry.disable_recursion_pending();
-    const std::optional<FrameFormat> format = format_of(entry->path());
+    const std::optional<PixelFormat> format = format_of(entry->path());
     if (!format || !entry->is_regular_file(type_error) || !is_safe_frame_name(name)) {
       contents.ignored.push_back(name);
     } else {
@@ -93,14 +94,14 @@ Result<FolderContents> order_by_time(FolderContents contents,
                                      const fs::path& table) {
   FolderContents ordered;
   ordered.ignored = std::move(contents.ignored);
-  std::map<std::string, FrameFormat, std::less<>> unlisted;
+  std::map<std::string, PixelFormat, std::less<>> unlisted;
   for (const RecordedFrame& frame : contents.frames) {
     unlisted.emplace(frame.name, frame.format);
   }
   for (const TimestampRow& row : rows) {
     // A listed picture that is not there stays in the list: it becomes an Error of its own when it
     // is read.
-    const std::optional<FrameFormat> format = format_of(row.name);
+    const std::optional<PixelFormat> format = format_of(row.name);
     if (!format) {
       return fail(ErrorCode::kCorruptData,
                   "{}: '{}' is not a *.jpg, *.jpeg or *.png file",
@@ -148,7 +149,7 @@ Result<FolderContents> list_from_file(const fs::path& list, const RecordingOptio
                       parse_frame_list(text, list.string(), options.max_frames));
   FolderContents contents;
   for (const std::string& path : paths) {
-    const std::optional<FrameFormat> format = format_of(path);
+    const std::optional<PixelFormat> format = format_of(path);
     if (format) {
       contents.frames.push_back({path, list.parent_path() / path, std::nullopt, *format, {}});
     } else {
@@ -259,15 +260,16 @@ Result<Recording> Recording::open(const fs::path& input, const RecordingOptions&
   return recording;
 }
 
-Result<Frame> Recording::frame(std::size_t index) const {
+Result<std::vector<std::uint8_t>> Recording::read(std::size_t index,
+                                                  std::vector<std::uint8_t> reuse) const {
   TM_CHECK(index < frames_.size());
-  const RecordedFrame& entry = frames_[index];
-  Frame frame{index, entry.name, entry.timestamp, entry.format, {}};
-  TM_ASSIGN_OR_RETURN(frame.bytes, read_file_bytes(entry.path, options_.max_frame_bytes));
-  if (frame.bytes.empty()) {
-    return fail(ErrorCode::kCorruptData, "{} is empty", entry.path.string());
+  const fs::path& path = frames_[index].path;
+  TM_ASSIGN_OR_RETURN(std::vector<std::uint8_t> bytes,
+                      read_file_again(path, options_.max_frame_bytes, std::move(reuse)));
+  if (bytes.empty()) {
+    return fail(ErrorCode::kCorruptData, "{} is empty", path.string());
   }
-  return frame;
+  return bytes;
 }
 
 Result<std::optional<std::vector<std::uint8_t>>> Recording::mask(std::size_t index) const {
@@ -279,14 +281,6 @@ Result<std::optional<std::vector<std::uint8_t>>> Recording::mask(std::size_t ind
   TM_ASSIGN_OR_RETURN(std::vector<std::uint8_t> bytes,
                       read_file_bytes(path, options_.max_frame_bytes));
   return std::optional(std::move(bytes));
-}
-
-Result<std::optional<Frame>> ReplaySource::next() {
-  if (next_index_ == recording_.size()) {
-    return std::optional<Frame>();
-  }
-  TM_ASSIGN_OR_RETURN(Frame frame, recording_.frame(next_index_++));
-  return std::optional<Frame>(std::move(frame));
 }
 
 }  // namespace trigmesh

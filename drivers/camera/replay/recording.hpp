@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/camera/frame_source.hpp"
+#include "drivers/camera/pixel_format.hpp"
 #include "firmware/base/result.hpp"
 
 namespace trigmesh {
@@ -51,7 +51,7 @@ struct RecordedFrame {
       name;  ///< relative to the image folder (list file: as written there), '/' as separator
   std::filesystem::path path;
   std::optional<std::chrono::nanoseconds> timestamp;
-  FrameFormat format = FrameFormat::kJpeg;
+  PixelFormat format = PixelFormat::kJpeg;  ///< kJpeg or kPng
   std::filesystem::path mask_path;  ///< masks/NAME.png of a recording or photo folder; empty: none
 };
 
@@ -78,9 +78,11 @@ class Recording {
   /// the table; sorted.
   [[nodiscard]] const std::vector<std::string>& ignored() const { return ignored_; }
 
-  /// Reads one picture. Precondition: index < size(). kNotFound, kIo, kLimitExceeded; kCorruptData
-  /// when the file is empty.
-  [[nodiscard]] Result<Frame> frame(std::size_t index) const;
+  /// Reads the file of one picture into the memory of `reuse`, which is moved in and out.
+  /// Precondition: index < size(). kNotFound, kIo, kLimitExceeded; kCorruptData when the file is
+  /// empty.
+  [[nodiscard]] Result<std::vector<std::uint8_t>> read(std::size_t index,
+                                                       std::vector<std::uint8_t> reuse = {}) const;
 
   /// Reads the mask of one picture, a PNG of its size in which white is to be left out; nothing
   /// when it has none. NAME of masks/NAME.png is that of the picture with or without its ending.
@@ -94,20 +96,6 @@ class Recording {
   RecordingKind kind_ = RecordingKind::kPhotoFolder;
   std::vector<RecordedFrame> frames_;
   std::vector<std::string> ignored_;
-};
-
-/// The frames of a recording one after the other.
-class ReplaySource final : public FrameSource {
- public:
-  explicit ReplaySource(Recording recording) : recording_(std::move(recording)) {}
-
-  [[nodiscard]] Result<std::optional<Frame>> next() override;
-
-  [[nodiscard]] const Recording& recording() const { return recording_; }
-
- private:
-  Recording recording_;
-  std::size_t next_index_ = 0;
 };
 
 }  // namespace trigmesh

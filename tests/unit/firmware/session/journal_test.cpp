@@ -64,8 +64,8 @@ class Journal : public ::testing::Test {
 constexpr std::size_t kNoteOverhead = kJournalHeaderBytes + kJournalTrailerBytes + 8;
 
 TEST_F(Journal, GoesOnWhereItStopped) {
-  clock_.set(nanoseconds(7));
-  wall_clock_.set(nanoseconds(8));
+  clock_.time = nanoseconds(7);
+  wall_clock_.time = nanoseconds(8);
   write_notes({"a", "b"});
   write_notes({"c"});
   const JournalScan found = scan();

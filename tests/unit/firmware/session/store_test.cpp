@@ -32,7 +32,7 @@ class Store : public ::testing::Test {
  protected:
   Store() {
     options_.root = temporary_.path() / "sessions";
-    wall_clock_.set(hours(24 * 365 * 56));
+    wall_clock_.time = hours(24 * 365 * 56);
   }
 
   [[nodiscard]] SessionStore open() {
@@ -228,7 +228,7 @@ TEST_F(Store, RemovesTheOldestFinishedSessionsToMakeRoom) {
 TEST_F(Store, IdsGoUpWhenTheClockGoesBack) {
   SessionStore store = open();
   const std::string first = create(store).manifest().id;
-  wall_clock_.set(hours(1));
+  wall_clock_.time = hours(1);
   Session second = create(store);
   EXPECT_GT(second.manifest().id, first);
   EXPECT_EQ(second.manifest().created_wall, hours(1));
