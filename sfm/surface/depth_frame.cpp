@@ -98,9 +98,9 @@ const PixelPlane* DepthFrame::find_plane(const Eigen::Vector3f& point_in_cam) co
         v < static_cast<float>(height_px))) {
     return nullptr;
   }
-  const auto pixel = static_cast<std::size_t>(static_cast<int>(v)) *
-                         static_cast<std::size_t>(width_px) +
-                     static_cast<std::size_t>(static_cast<int>(u));
+  const auto pixel =
+      static_cast<std::size_t>(static_cast<int>(v)) * static_cast<std::size_t>(width_px) +
+      static_cast<std::size_t>(static_cast<int>(u));
   const PixelPlane& plane = planes[pixel];
   return plane.depth > 0.0F ? &plane : nullptr;
 }

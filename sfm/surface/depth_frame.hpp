@@ -14,9 +14,9 @@ namespace trigmesh {
 /// What one pixel says: a small plane in front of the camera. 32 bytes, read together.
 struct PixelPlane {
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();  ///< camera frame, unit, towards the camera
-  float offset = 0.0F;      ///< normal . x of the points x of the plane
-  float depth = 0.0F;       ///< z; 0 = nothing known
-  float weight = 0.0F;      ///< confidence * cosine of the viewing angle / (pixel footprint)^2, scaled
+  float offset = 0.0F;                               ///< normal . x of the points x of the plane
+  float depth = 0.0F;                                ///< z; 0 = nothing known
+  float weight = 0.0F;  ///< confidence * cosine of the viewing angle / (pixel footprint)^2, scaled
   float free_depth = 0.0F;  ///< space is empty up to here: the nearest depth of the pixels around
   float padding = 0.0F;
 };
@@ -36,6 +36,7 @@ struct DepthFrame {
   [[nodiscard]] Eigen::Vector3f to_camera(const Eigen::Vector3f& point_in_world) const {
     return rotation_cam_from_world * point_in_world + translation_cam_from_world;
   }
+
   /// The plane that the pixel nearest to a point in front of the camera holds; null outside the
   /// picture, behind the camera and where nothing is known.
   [[nodiscard]] const PixelPlane* find_plane(const Eigen::Vector3f& point_in_cam) const;
@@ -43,7 +44,7 @@ struct DepthFrame {
 
 /// Which pixels take part.
 struct DepthFrameOptions {
-  float voxel_size = 1.0F;           ///< scene units; weights are scaled so that footprint = voxel gives 1
+  float voxel_size = 1.0F;  ///< scene units; weights are scaled so that footprint = voxel gives 1
   float max_footprint_voxels = 5.0F;
 };
 

@@ -33,7 +33,9 @@ Edge edge_of(std::uint32_t a, std::uint32_t b) {
 }
 
 /// Cosine of the angle at `tip`.
-float corner_cosine(const Eigen::Vector3f& tip, const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
+float corner_cosine(const Eigen::Vector3f& tip,
+                    const Eigen::Vector3f& a,
+                    const Eigen::Vector3f& b) {
   const Eigen::Vector3f to_a = a - tip;
   const Eigen::Vector3f to_b = b - tip;
   return to_a.dot(to_b) / std::max(to_a.norm() * to_b.norm(), 1e-30F);
@@ -51,7 +53,8 @@ std::uint32_t tip_of(const std::array<std::uint32_t, 3>& face, const Edge& edge)
 }
 
 /// Turns the face so that it starts with the corner after `tip`.
-std::array<std::uint32_t, 3> opposite_first(const std::array<std::uint32_t, 3>& face, std::uint32_t tip) {
+std::array<std::uint32_t, 3> opposite_first(const std::array<std::uint32_t, 3>& face,
+                                            std::uint32_t tip) {
   std::array<std::uint32_t, 3> turned = face;
   while (turned[2] != tip) {
     std::rotate(turned.begin(), turned.begin() + 1, turned.end());
@@ -80,15 +83,19 @@ void flip_edges(HolePatch& patch) {
     const std::uint32_t p = tip_of(patch.faces[faces[0]], edge);
     const std::uint32_t q = tip_of(patch.faces[faces[1]], edge);
     const auto& points = patch.points;
-    const float at_tips = std::acos(std::clamp(corner_cosine(points[p], points[edge.first], points[edge.second]), -1.0F, 1.0F)) +
-                          std::acos(std::clamp(corner_cosine(points[q], points[edge.first], points[edge.second]), -1.0F, 1.0F));
+    const float at_tips =
+        std::acos(std::clamp(
+            corner_cosine(points[p], points[edge.first], points[edge.second]), -1.0F, 1.0F)) +
+        std::acos(std::clamp(
+            corner_cosine(points[q], points[edge.first], points[edge.second]), -1.0F, 1.0F));
     const auto turned = opposite_first(patch.faces[faces[0]], p);  // from a to b, tip p
     const std::uint32_t a = turned[0];
     const std::uint32_t b = turned[1];
     const Eigen::Vector3f first = (points[q] - points[a]).cross(points[p] - points[a]);
     const Eigen::Vector3f second = (points[p] - points[b]).cross(points[q] - points[b]);
     constexpr float kHalfTurn = 3.15F;
-    if (at_tips > kHalfTurn && p != q && edges.count(edge_of(p, q)) == 0 && first.dot(second) > 0.0F) {
+    if (at_tips > kHalfTurn && p != q && edges.count(edge_of(p, q)) == 0 &&
+        first.dot(second) > 0.0F) {
       patch.faces[faces[0]] = {a, q, p};
       patch.faces[faces[1]] = {b, p, q};
       touched[faces[0]] = 1;

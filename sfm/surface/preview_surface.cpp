@@ -14,6 +14,7 @@ constexpr int kMapWidthPx = 160;
 class SparseMaps final : public DepthMapSource {
  public:
   explicit SparseMaps(const std::vector<SparseDepth>& sparse) : sparse_(sparse) {}
+
   [[nodiscard]] Result<DepthMap> load(std::size_t view) const override { return sparse_[view].map; }
 
  private:
@@ -23,6 +24,7 @@ class SparseMaps final : public DepthMapSource {
 class SparseImages final : public ViewImageSource {
  public:
   explicit SparseImages(const std::vector<SparseDepth>& sparse) : sparse_(sparse) {}
+
   [[nodiscard]] Result<ViewImage> load(std::size_t view) const override {
     return sparse_[view].image;
   }

@@ -98,8 +98,9 @@ std::vector<std::array<std::size_t, 3>> triangulate(const std::vector<ImagePoint
 void draw(const std::array<const ImagePoint*, 3>& corners, SparseDepth& sparse) {
   const Camera& camera = sparse.map.camera;
   const auto& [a, b, c] = corners;
-  const float longest = static_cast<float>(std::max(
-      {cv::norm(a->pixel - b->pixel), cv::norm(b->pixel - c->pixel), cv::norm(c->pixel - a->pixel)}));
+  const float longest = static_cast<float>(std::max({cv::norm(a->pixel - b->pixel),
+                                                     cv::norm(b->pixel - c->pixel),
+                                                     cv::norm(c->pixel - a->pixel)}));
   const auto depths = std::minmax({a->in_cam.z(), b->in_cam.z(), c->in_cam.z()});
   Eigen::Vector3d normal = (b->in_cam - a->in_cam).cross(c->in_cam - a->in_cam).normalized();
   normal *= normal.dot(a->in_cam) > 0.0 ? -1.0 : 1.0;
@@ -112,15 +113,25 @@ void draw(const std::array<const ImagePoint*, 3>& corners, SparseDepth& sparse) 
   basis << a->pixel.x, b->pixel.x, c->pixel.x, a->pixel.y, b->pixel.y, c->pixel.y, 1.0F, 1.0F, 1.0F;
   const Eigen::Matrix3f weights_of_pixel = basis.inverse();
   const double offset = normal.dot(a->in_cam);
-  const auto low = [](float p, float q, float r) { return static_cast<int>(std::ceil(std::min({p, q, r}))); };
-  const auto high = [](float p, float q, float r) { return static_cast<int>(std::floor(std::max({p, q, r}))); };
-  for (int y = low(a->pixel.y, b->pixel.y, c->pixel.y); y <= high(a->pixel.y, b->pixel.y, c->pixel.y); ++y) {
-    for (int x = low(a->pixel.x, b->pixel.x, c->pixel.x); x <= high(a->pixel.x, b->pixel.x, c->pixel.x); ++x) {
-      const Eigen::Vector3f weights = weights_of_pixel * Eigen::Vector3f(static_cast<float>(x), static_cast<float>(y), 1.0F);
+  const auto low = [](float p, float q, float r) {
+    return static_cast<int>(std::ceil(std::min({p, q, r})));
+  };
+  const auto high = [](float p, float q, float r) {
+    return static_cast<int>(std::floor(std::max({p, q, r})));
+  };
+  for (int y = low(a->pixel.y, b->pixel.y, c->pixel.y);
+       y <= high(a->pixel.y, b->pixel.y, c->pixel.y);
+       ++y) {
+    for (int x = low(a->pixel.x, b->pixel.x, c->pixel.x);
+         x <= high(a->pixel.x, b->pixel.x, c->pixel.x);
+         ++x) {
+      const Eigen::Vector3f weights =
+          weights_of_pixel * Eigen::Vector3f(static_cast<float>(x), static_cast<float>(y), 1.0F);
       if (!(weights.minCoeff() >= 0.0F)) {
         continue;
       }
-      const Eigen::Vector3d ray((x - camera.cx_px) / camera.fx_px, (y - camera.cy_px) / camera.fy_px, 1.0);
+      const Eigen::Vector3d ray(
+          (x - camera.cx_px) / camera.fx_px, (y - camera.cy_px) / camera.fy_px, 1.0);
       const Eigen::Vector3f rgb = weights[0] * a->rgb + weights[1] * b->rgb + weights[2] * c->rgb;
       sparse.map.depth.at<float>(y, x) = static_cast<float>(offset / normal.dot(ray));
       const Eigen::Vector3f n = normal.cast<float>();

@@ -13,9 +13,9 @@ struct SparseDepth {
 };
 
 /// Interpolates the landmarks that a registered view sees over their Delaunay triangulation in the
-/// image (Delaunay 1934; cv::Subdiv2D). Triangles with long edges or with a jump in depth, and those
-/// seen too steeply, are left out. `width_px` is the width of the map. Empty mats when the view has
-/// no pose or sees fewer than three landmarks.
+/// image (Delaunay 1934; cv::Subdiv2D). Triangles with long edges or with a jump in depth, and
+/// those seen too steeply, are left out. `width_px` is the width of the map. Empty mats when the
+/// view has no pose or sees fewer than three landmarks.
 [[nodiscard]] SparseDepth interpolate_landmarks(const Scene& scene, ViewId view, int width_px);
 
 }  // namespace trigmesh

@@ -8,6 +8,7 @@
 #include "sfm/surface/depth_fusion.hpp"
 #include "sfm/surface/hole_filling.hpp"
 #include "sfm/surface/mesh_cleaning.hpp"
+#include "sfm/surface/mesh_flipping.hpp"
 #include "sfm/surface/mesh_repair.hpp"
 #include "sfm/surface/mesh_simplification.hpp"
 #include "sfm/surface/mesh_topology.hpp"
@@ -105,6 +106,7 @@ Result<SurfaceResult> make_surface(const SurfaceInput& input,
   smooth_borders(kBorderPasses, mesh);
   report.faces_before_simplification = mesh.faces.size();
   report.simplification_error = simplify(options.max_faces, mesh);
+  flip_slivers(mesh);
   mesh.normals = vertex_normals(mesh);
   report.non_manifold_edges = analyze_topology(mesh).non_manifold_edges;
   return SurfaceResult{std::move(mesh), std::move(report)};

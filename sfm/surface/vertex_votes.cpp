@@ -21,7 +21,8 @@ Eigen::Vector4f sample(const ViewImage& image, float x, float y) {
   const auto top = static_cast<int>(std::floor(y));
   const int nearest_x = static_cast<int>(std::lround(x));
   const int nearest_y = static_cast<int>(std::lround(y));
-  if (nearest_x < 0 || nearest_y < 0 || nearest_x >= image.rgb.cols || nearest_y >= image.rgb.rows ||
+  if (nearest_x < 0 || nearest_y < 0 || nearest_x >= image.rgb.cols ||
+      nearest_y >= image.rgb.rows ||
       (!image.mask.empty() && image.mask.at<std::uint8_t>(nearest_y, nearest_x) == 0)) {
     return Eigen::Vector4f::Zero();
   }
@@ -49,8 +50,10 @@ void VertexVotes::add_view(const DepthFrame& frame,
                            float tolerance,
                            Executor& executor) {
   TM_CHECK(mesh.positions.size() == support_.size() && mesh.normals.size() == support_.size());
-  const float scale_x = static_cast<float>(image.rgb.cols) / static_cast<float>(std::max(frame.width_px, 1));
-  const float scale_y = static_cast<float>(image.rgb.rows) / static_cast<float>(std::max(frame.height_px, 1));
+  const float scale_x =
+      static_cast<float>(image.rgb.cols) / static_cast<float>(std::max(frame.width_px, 1));
+  const float scale_y =
+      static_cast<float>(image.rgb.rows) / static_cast<float>(std::max(frame.height_px, 1));
   const auto vote = [&](std::size_t i) {
     const Eigen::Vector3f point = frame.to_camera(mesh.positions[i]);
     const PixelPlane* plane = frame.find_plane(point);
@@ -83,8 +86,8 @@ void VertexVotes::add_view(const DepthFrame& frame,
 }
 
 std::vector<std::array<std::uint8_t, 3>> VertexVotes::colors() const {
-  std::vector<std::array<std::uint8_t, 3>> colors(
-      color_sums_.size(), {kUnknownColor, kUnknownColor, kUnknownColor});
+  std::vector<std::array<std::uint8_t, 3>> colors(color_sums_.size(),
+                                                  {kUnknownColor, kUnknownColor, kUnknownColor});
   for (std::size_t i = 0; i < colors.size(); ++i) {
     const Eigen::Vector4f& sum = color_sums_[i];
     for (Eigen::Index c = 0; c < 3 && sum[3] > 0.0F; ++c) {

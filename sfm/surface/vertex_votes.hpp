@@ -18,9 +18,9 @@ class VertexVotes {
  public:
   explicit VertexVotes(std::size_t vertex_count);
 
-  /// A view agrees with a vertex when the plane of its pixel passes within `tolerance` (scene units)
-  /// and the vertex faces it. `rgb` is empty or CV_8UC3 of any size of the same field of view, `mask`
-  /// empty or CV_8UC1 of the size of `rgb`: where it is 0 the view gives no colour.
+  /// A view agrees with a vertex when the plane of its pixel passes within `tolerance` (scene
+  /// units) and the vertex faces it. `rgb` is empty or CV_8UC3 of any size of the same field of
+  /// view, `mask` empty or CV_8UC1 of the size of `rgb`: where it is 0 the view gives no colour.
   void add_view(const DepthFrame& frame,
                 const ViewImage& image,
                 const TriangleMesh& mesh,
@@ -29,6 +29,7 @@ class VertexVotes {
 
   /// Views that agree, per vertex.
   [[nodiscard]] const std::vector<std::uint16_t>& support() const { return support_; }
+
   /// Weighted means; grey where no view gave a colour.
   [[nodiscard]] std::vector<std::array<std::uint8_t, 3>> colors() const;
 

@@ -210,11 +210,11 @@ TEST_F(MakeSurface, IsTheSameInOneTileAndInMany) {
 
 TEST_F(MakeSurface, TakesLargerVoxelsWhenTheMeshDoesNotFit) {
   const auto result = make(RenderedMaps(sphere, views_),
-                           {.voxel_size = 0.005, .max_memory_bytes = std::size_t{4} << 20U});
+                           {.voxel_size = 0.007, .max_memory_bytes = std::size_t{4} << 20U});
   ASSERT_TRUE(result) << result.error().message;
   EXPECT_GT(result->report.memory_steps, 0);
   EXPECT_NEAR(result->report.voxel_size,
-              0.005 * std::pow(kVoxelGrowthRatio, result->report.memory_steps),
+              0.007 * std::pow(kVoxelGrowthRatio, result->report.memory_steps),
               1e-9);
   EXPECT_LE(result->report.grid_bytes, std::size_t{4} << 20U);
 }

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "sfm/surface/mesh_fitting.hpp"
+#include "sfm/surface/mesh_flipping.hpp"
 #include "sfm/surface/mesh_simplification.hpp"
 #include "sfm/surface/mesh_topology.hpp"
 #include "tests/unit/sfm/surface/mesh_examples.hpp"
@@ -108,6 +109,26 @@ TEST(MeshCleaning, SmoothsTheTeethOfABorder) {
     EXPECT_NEAR(mesh.positions[x].y(), 0.3F, 0.1F);
   }
   EXPECT_EQ(mesh.positions[5 * 21 + 5], Eigen::Vector3f(5, 5, 0));
+}
+
+TEST(MeshFlipping, TurnsAFoldOfTwoSlivers) {
+  TriangleMesh mesh;
+  mesh.positions = {{0, 0, 0}, {4, 0, 0}, {2, 0.3F, 0.3F}, {2, -0.3F, 0.3F}};
+  mesh.faces = {{0, 1, 2}, {1, 0, 3}};
+  EXPECT_EQ(flip_slivers(mesh), 1U);
+  EXPECT_TRUE(test::is_two_manifold(mesh));
+  for (const Eigen::Vector3f& normal : vertex_normals(mesh)) {
+    EXPECT_GT(normal.z(), 0.9F);
+  }
+}
+
+TEST(MeshFlipping, KeepsARidge) {
+  TriangleMesh mesh = test::make_sheet(20);
+  for (Eigen::Vector3f& p : mesh.positions) {
+    p.y() += 0.7F * p.x();
+    p.z() = -std::abs(p.x() - 10.0F);
+  }
+  EXPECT_EQ(flip_slivers(mesh), 0U);
 }
 
 TEST(MeshTopology, NormalsDoNotDependOnHowASideIsCut) {
