@@ -1,6 +1,7 @@
 #pragma once
 
 #include <bit>
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <span>
@@ -43,10 +44,8 @@ class BinaryWriter {
   [[nodiscard]] std::vector<std::uint8_t> take() { return std::move(bytes_); }
 
  private:
-  void append(const void* data, std::size_t size) {
-    const auto* bytes = static_cast<const std::uint8_t*>(data);
-    bytes_.insert(bytes_.end(), bytes, bytes + size);
-  }
+  // Not inline: g++ 12 sees overflows in vectors whose size it half knows.
+  void append(const void* data, std::size_t size);
 
   std::vector<std::uint8_t> bytes_;
 };

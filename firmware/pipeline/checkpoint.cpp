@@ -5,8 +5,8 @@
 
 #include <xxhash.h>
 
-#include "firmware/base/check.hpp"
 #include "firmware/base/binary_stream.hpp"
+#include "firmware/base/check.hpp"
 #include "sfm/exchange/file_io.hpp"
 
 namespace trigmesh {

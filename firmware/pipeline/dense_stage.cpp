@@ -7,8 +7,8 @@
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
-#include "firmware/base/check.hpp"
 #include "firmware/base/binary_stream.hpp"
+#include "firmware/base/check.hpp"
 #include "sfm/dense/depth_filter.hpp"
 #include "sfm/dense/fusion.hpp"
 #include "sfm/dense/undistortion.hpp"

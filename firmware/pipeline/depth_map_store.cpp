@@ -5,8 +5,8 @@
 #include <fmt/format.h>
 #include <opencv2/core.hpp>
 
-#include "firmware/base/check.hpp"
 #include "firmware/base/binary_stream.hpp"
+#include "firmware/base/check.hpp"
 
 namespace trigmesh {
 

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "firmware/base/check.hpp"
 #include "firmware/base/binary_stream.hpp"
+#include "firmware/base/check.hpp"
 #include "firmware/pipeline/checkpoint.hpp"
 #include "sfm/exchange/exif.hpp"
 #include "sfm/exchange/image_codec.hpp"

@@ -5,8 +5,8 @@
 
 #include <fmt/format.h>
 
-#include "firmware/base/check.hpp"
 #include "firmware/base/binary_stream.hpp"
+#include "firmware/base/check.hpp"
 #include "sfm/matching/pair_matching.hpp"
 
 namespace trigmesh {

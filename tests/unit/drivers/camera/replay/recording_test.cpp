@@ -58,6 +58,21 @@ TEST_F(RecordingTest, FindsMasksByTheNameWithAndWithoutItsEnding) {
   EXPECT_EQ(text_of_mask(2), "mask of c");
 }
 
+TEST_F(RecordingTest, ReadsASessionOfTheRig) {
+  write("frames/000002.jpg");
+  write("frames/000001.jpg");
+  write("session.json", "{}");
+  const auto without_table = Recording::open(root_);
+  ASSERT_TRUE(without_table) << without_table.error().message;
+  EXPECT_EQ(without_table->kind(), RecordingKind::kSession);
+  EXPECT_THAT(names(*without_table), ElementsAre("000001.jpg", "000002.jpg"));
+  write("frames.csv", "name,timestamp_ns,exposure_ns,gain\n000001.jpg,9,,\n000002.jpg,8,,\n");
+  const auto recording = Recording::open(root_);
+  ASSERT_TRUE(recording) << recording.error().message;
+  EXPECT_THAT(names(*recording), ElementsAre("000002.jpg", "000001.jpg"));
+  EXPECT_EQ(recording->frames()[0].timestamp, nanoseconds(8));
+}
+
 TEST_F(RecordingTest, ListsPhotographsInNaturalOrderAndCountsTheRest) {
   for (const char* name : {"IMG_10.JPG", "IMG_9.jpeg", "IMG_11.png", "notes.txt", ".hidden.jpg"}) {
     write(name);
