@@ -9,9 +9,9 @@
 #include <fmt/format.h>
 #include <opencv2/core.hpp>
 
+#include "firmware/base/binary_stream.hpp"
 #include "firmware/base/check.hpp"
 #include "firmware/base/file_bytes.hpp"
-#include "firmware/pipeline/binary_stream.hpp"
 #include "firmware/pipeline/dense_stage.hpp"
 #include "firmware/pipeline/model_writer.hpp"
 #include "firmware/pipeline/photo_images.hpp"

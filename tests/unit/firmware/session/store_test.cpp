@@ -108,7 +108,7 @@ TEST_F(Store, ASessionIsARecording) {
   ASSERT_EQ(recording->size(), 2U);
   EXPECT_EQ(recording->frames()[1].name, "000002.jpg");
   EXPECT_EQ(recording->frames()[1].timestamp, milliseconds(200));
-  EXPECT_EQ(recording->frame(1)->bytes, bytes());
+  EXPECT_EQ(recording->read(1), bytes());
   EXPECT_THAT(recording->ignored(), IsEmpty());
 }
 
