@@ -17,21 +17,6 @@ using Json = nlohmann::json;
 
 constexpr std::size_t kMaxCameraGroups = 100'000;
 
-constexpr std::array kRefusalReasons{
-    RefusalReason::kNone,
-    RefusalReason::kUnreadable,
-    RefusalReason::kTooSmall,
-    RefusalReason::kTooFewFeatures,
-    RefusalReason::kDuplicate,
-    RefusalReason::kNoOverlap,
-    RefusalReason::kPureRotation,
-    RefusalReason::kNoParallax,
-    RefusalReason::kTooFewMapMatches,
-    RefusalReason::kPoseRejected,
-    RefusalReason::kPoseUnstable,
-    RefusalReason::kOtherComponent,
-    RefusalReason::kNoGivenPose,
-};
 constexpr std::array kTwoViewKinds{
     TwoViewKind::kNone,
     TwoViewKind::kGeneral,
@@ -77,7 +62,7 @@ Result<Enum> one_of(const Json& object, const char* name, std::span<const Enum> 
 Result<ImageOutcome> parse_image(const Json& json) {
   ImageOutcome image;
   TM_ASSIGN_OR_RETURN(image.name, text_of(json, "name"));
-  TM_ASSIGN_OR_RETURN(image.reason, one_of<RefusalReason>(json, "status", kRefusalReasons));
+  TM_ASSIGN_OR_RETURN(image.reason, one_of<RefusalReason>(json, "status", kAllRefusalReasons));
   TM_ASSIGN_OR_RETURN(image.detail, text_of(json, "detail"));
   TM_ASSIGN_OR_RETURN(image.features, count_of(json, "features"));
   TM_ASSIGN_OR_RETURN(image.overlapping_images, count_of(json, "overlapping_images"));

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <string>
 #include <string_view>
@@ -23,6 +24,23 @@ enum class RefusalReason {
   kPoseUnstable,      ///< a pose was found and lost again in adjustment
   kOtherComponent,    ///< registered in another part that has no link to the main model
   kNoGivenPose,       ///< poses were given, and none for this image
+};
+
+/// All of them, in the order above.
+inline constexpr std::array kAllRefusalReasons{
+    RefusalReason::kNone,
+    RefusalReason::kUnreadable,
+    RefusalReason::kTooSmall,
+    RefusalReason::kTooFewFeatures,
+    RefusalReason::kDuplicate,
+    RefusalReason::kNoOverlap,
+    RefusalReason::kPureRotation,
+    RefusalReason::kNoParallax,
+    RefusalReason::kTooFewMapMatches,
+    RefusalReason::kPoseRejected,
+    RefusalReason::kPoseUnstable,
+    RefusalReason::kOtherComponent,
+    RefusalReason::kNoGivenPose,
 };
 
 /// "registered" for kNone, else the snake_case name without k: "unreadable", "no_overlap", ...
