@@ -9,6 +9,7 @@
 
 #include "firmware/base/check.hpp"
 #include "firmware/base/file_bytes.hpp"
+#include "firmware/pipeline/model_writer.hpp"
 #include "sfm/exchange/model_folder.hpp"
 
 namespace trigmesh {
@@ -71,8 +72,8 @@ Result<ExistingModel> open_existing_model(const fs::path& path) {
   TM_ASSIGN_OR_RETURN(Scene main, read_model(path));
   model.components.push_back(std::move(main));
   const fs::path folder = model_folder_of(path);
-  for (std::size_t k = 2; file_exists(folder / fmt::format("component_{}", k)); ++k) {
-    TM_ASSIGN_OR_RETURN(Scene part, read_model(folder / fmt::format("component_{}", k)));
+  for (std::size_t i = 1; file_exists(component_folder(folder, i)); ++i) {
+    TM_ASSIGN_OR_RETURN(Scene part, read_model(component_folder(folder, i)));
     model.components.push_back(std::move(part));
   }
   if (file_exists(folder / "report.json")) {

@@ -106,13 +106,16 @@ Result<> write_model(const std::filesystem::path& output,
   const StagedFolder staged(output / ".model.part");
   TM_RETURN_IF_ERROR(make_directory(staged.path()));
   for (std::size_t i = 0; i < components.size(); ++i) {
-    const std::filesystem::path folder =
-        i == 0 ? staged.path() : staged.path() / fmt::format("component_{}", i + 1);
+    const std::filesystem::path folder = component_folder(staged.path(), i);
     TM_RETURN_IF_ERROR(make_directory(folder / "sparse"));
     TM_RETURN_IF_ERROR(write_component(components[i], folder));
   }
   TM_RETURN_IF_ERROR(write_reports(staged.path(), components, report, {}));
   return replace_directory(staged.path(), output / "model");
+}
+
+std::filesystem::path component_folder(const std::filesystem::path& model, std::size_t index) {
+  return index == 0 ? model : model / fmt::format("component_{}", index + 1);
 }
 
 Result<> write_timings(const std::filesystem::path& output, std::span<const StageTime> times) {

@@ -30,6 +30,10 @@ namespace trigmesh {
                                     const ReconstructionReport& report,
                                     const ReportAttachments& attachments = {});
 
+/// Where part `index` of a model lies: the main one in `model` itself, the others below it.
+[[nodiscard]] std::filesystem::path component_folder(const std::filesystem::path& model,
+                                                     std::size_t index);
+
 /// Writes `output`/timings.json: seconds and processor seconds per stage. Clock times live here and
 /// nowhere else.
 [[nodiscard]] Result<> write_timings(const std::filesystem::path& output,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <numeric>
 #include <optional>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -66,6 +67,13 @@ Result<> publish(const Work& work, const std::vector<NamedFile>& files) {
       {.glb = work.glb, .glb_name = "textured.glb", .depth_pictures = work.pictures});
 }
 
+/// What the checkpoint of the cloud holds: a hash of its file.
+std::vector<std::uint8_t> seal_of(std::string_view ply) {
+  BinaryWriter seal;
+  seal.value(content_hash(ply));
+  return seal.take();
+}
+
 /// The cloud of a former run in the model, when its file is the one that was made of these maps.
 std::optional<DenseCloud> stored_cloud(const Work& work, const DepthMaps& depth) {
   const auto told = work.context.checkpoints.load("dense", depth.key);
@@ -73,9 +81,7 @@ std::optional<DenseCloud> stored_cloud(const Work& work, const DepthMaps& depth)
     return std::nullopt;
   }
   const auto ply = read_file(work.input.output / "model" / "dense.ply", kMaxCloudBytes);
-  BinaryWriter hash;
-  hash.value(ply ? content_hash(*ply) : 0);
-  if (!ply || hash.take() != *told) {
+  if (!ply || seal_of(*ply) != *told) {
     return std::nullopt;
   }
   auto points = read_dense_ply(*ply);
@@ -135,11 +141,9 @@ Result<> densify(Work& work, const DenseInput& input, const DepthMaps& depth) {
   std::vector<NamedFile> files(1);
   files[0] = {"dense.ply", write_dense_ply(cloud)};
   DenseCloud().swap(cloud);
-  BinaryWriter hash;
-  hash.value(content_hash(files[0].bytes));
   work.stopwatch.finish(Stage::kFuse);
   TM_RETURN_IF_ERROR(publish(work, files));
-  return work.context.checkpoints.save("dense", depth.key, hash.take());
+  return work.context.checkpoints.save("dense", depth.key, seal_of(files[0].bytes));
 }
 
 SurfaceSection sum_up(const SurfaceResult& made) {
