@@ -41,7 +41,7 @@ void put_optional(BinaryWriter& out, const std::optional<T>& value) {
 struct PayloadWriter {
   BinaryWriter& out;
 
-  void operator()(const TriggerEdge& entry) const {
+  void operator()(const EdgeRecord& entry) const {
     out.value(entry.direction);
     out.value(static_cast<std::int64_t>(entry.kernel_time.count()));
   }
@@ -140,7 +140,7 @@ class PayloadReader {
   bool valid_ = true;
 };
 
-void read(PayloadReader& in, TriggerEdge& entry) {
+void read(PayloadReader& in, EdgeRecord& entry) {
   entry.direction = in.choice(EdgeDirection::kRelease);
   entry.kernel_time = in.time();
 }

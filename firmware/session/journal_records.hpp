@@ -15,11 +15,11 @@ namespace trigmesh {
 enum class EdgeDirection : std::uint8_t { kPress, kRelease };
 
 /// The trigger line changed.
-struct TriggerEdge {
+struct EdgeRecord {
   EdgeDirection direction = EdgeDirection::kPress;
   std::chrono::nanoseconds kernel_time{};  ///< the kernel's monotonic clock
 
-  bool operator==(const TriggerEdge&) const = default;
+  bool operator==(const EdgeRecord&) const = default;
 };
 
 /// What the camera said about a frame.
@@ -117,7 +117,7 @@ struct Note {
   bool operator==(const Note&) const = default;
 };
 
-using JournalEntry = std::variant<TriggerEdge,
+using JournalEntry = std::variant<EdgeRecord,
                                   FrameKept,
                                   FrameRefused,
                                   KeyframeChosen,

@@ -47,7 +47,7 @@ std::vector<Press> PressDetector::on_time(nanoseconds now) {
   return presses;
 }
 
-std::vector<Press> PressDetector::on_edge(const TriggerEdge& edge) {
+std::vector<Press> PressDetector::on_edge(const EdgeRecord& edge) {
   const nanoseconds time = std::max(edge.kernel_time, last_time_);
   std::vector<Press> presses = on_time(time);
   if (edge.direction == EdgeDirection::kPress) {

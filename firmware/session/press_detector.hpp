@@ -50,7 +50,7 @@ class PressDetector {
   explicit PressDetector(const PressOptions& options);
 
   /// Times must not go back; one that does counts as the time before. Includes what on_time says.
-  [[nodiscard]] std::vector<Press> on_edge(const TriggerEdge& edge);
+  [[nodiscard]] std::vector<Press> on_edge(const EdgeRecord& edge);
 
   /// What is certain at `now`, on the clock of the edges, given that no edge came before it.
   [[nodiscard]] std::vector<Press> on_time(std::chrono::nanoseconds now);

@@ -41,7 +41,7 @@ struct SessionRecovery {
 /// One session on disk. A frame is acknowledged when add_frame returns: from then on it survives a
 /// power cut at any instant. Used as
 ///
-///     session.record(TriggerEdge{..});
+///     session.record(EdgeRecord{..});
 ///     TM_ASSIGN_OR_RETURN(auto number, session.add_frame(jpeg, metadata));
 ///     session.close("long press");
 ///     // make a model in session.staged_model()

@@ -42,7 +42,7 @@ void undo(Session& session, const Promises& promises) {
 
 void capture(SessionStore& store, Session& session, const Promises& promises) {
   for (std::uint32_t i = 1; i <= kFrames; ++i) {
-    (void)session.record(TriggerEdge{EdgeDirection::kPress, std::chrono::milliseconds(100 * i)});
+    (void)session.record(EdgeRecord{EdgeDirection::kPress, std::chrono::milliseconds(100 * i)});
     // The number is part of the picture, and known only afterwards: the next one is tried.
     const std::uint32_t shown = i;
     if (const auto number = session.add_frame(picture(shown), metadata_of(shown))) {

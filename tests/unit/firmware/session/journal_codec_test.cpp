@@ -14,7 +14,7 @@ using ::testing::HasSubstr;
 
 std::vector<JournalEntry> one_of_each_kind() {
   FrameMetadata metadata{nanoseconds(123), nanoseconds(10'000'000), 2.5, std::nullopt, 77};
-  return {TriggerEdge{EdgeDirection::kRelease, nanoseconds(5)},
+  return {EdgeRecord{EdgeDirection::kRelease, nanoseconds(5)},
           FrameKept{3, 1000, 0xABCDEF, metadata},
           FrameRefused{FrameRefusal::kBlurred, 0, 78, 0.25},
           KeyframeChosen{3},

@@ -147,7 +147,7 @@ TEST_F(Journal, WritesNothingMoreAfterAFailedSync) {
 TEST_F(Journal, AcknowledgedRecordsAreOnTheDiskAndOthersWait) {
   JournalWriter writer = open();
   const std::size_t before = files_.calls();
-  ASSERT_TRUE(writer.append(TriggerEdge{}));
+  ASSERT_TRUE(writer.append(EdgeRecord{}));
   EXPECT_EQ(files_.calls() - before, 1U);  // the write
   ASSERT_TRUE(writer.append(FrameKept{}));
   EXPECT_EQ(files_.calls() - before, 3U);  // the write and the fsync
@@ -161,7 +161,7 @@ TEST_F(Journal, SyncsWhatSomebodyActsOn) {
   EXPECT_TRUE(must_be_durable(StateChange{}));
   EXPECT_TRUE(must_be_durable(SettingsUsed{}));
   EXPECT_FALSE(must_be_durable(FrameRefused{FrameRefusal::kBlurred, 0, 0, 0.0}));
-  EXPECT_FALSE(must_be_durable(TriggerEdge{}));
+  EXPECT_FALSE(must_be_durable(EdgeRecord{}));
   EXPECT_FALSE(must_be_durable(Note{}));
 }
 
