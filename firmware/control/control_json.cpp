@@ -11,7 +11,9 @@ std::string line_of(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-std::string_view name_of(RigPhase phase) {
+}  // namespace
+
+std::string_view to_string(RigPhase phase) {
   switch (phase) {
     case RigPhase::kIdle:
       return "idle";
@@ -25,7 +27,7 @@ std::string_view name_of(RigPhase phase) {
   return "unknown";
 }
 
-std::string_view name_of(JobState job) {
+std::string_view to_string(JobState job) {
   switch (job) {
     case JobState::kNone:
       return "none";
@@ -39,19 +41,23 @@ std::string_view name_of(JobState job) {
   return "unknown";
 }
 
-}  // namespace
-
 std::string render_status(const ControlStatus& status) {
   Json json;
-  json["phase"] = name_of(status.phase);
+  json["phase"] = to_string(status.phase);
   json["camera_present"] = status.camera_present;
   json["storage"] = to_string(status.storage);
   json["session"] = status.session_id;
   json["frames"] = status.frames;
-  json["job"] = name_of(status.job);
+  json["job"] = to_string(status.job);
   json["queued_models"] = status.queued_models;
   json["available_bytes"] = status.available_bytes;
   json["software_version"] = status.software_version;
+  json["fault"] = status.fault;
+  json["model_session"] = status.model_session_id;
+  json["model_stage"] = status.model_stage;
+  json["model_done"] = status.model_done;
+  json["model_total"] = status.model_total;
+  json["last_event"] = status.last_event;
   return line_of(json);
 }
 
@@ -69,6 +75,31 @@ std::string render_sessions(std::span<const SessionInfo> sessions) {
     list.push_back(std::move(json));
   }
   return line_of(list);
+}
+
+std::string render_devices(std::span<const DeviceInfo> devices) {
+  Json list = Json::array();
+  for (const DeviceInfo& device : devices) {
+    list.push_back({{"kind", device.kind},
+                    {"name", device.stable_name},
+                    {"model", device.model},
+                    {"note", device.note}});
+  }
+  return line_of(list);
+}
+
+std::string render_export(const ExportReport& report) {
+  Json json;
+  json["folder"] = report.folder.string();
+  json["files"] = report.file_count;
+  json["size_bytes"] = report.size_bytes;
+  return line_of(json);
+}
+
+std::string render_export_request(const std::filesystem::path& destination) {
+  Json json;
+  json["destination"] = destination.string();
+  return line_of(json);
 }
 
 std::string render_error(std::string_view message) {
@@ -98,6 +129,26 @@ int http_status_of(ErrorCode code) {
       break;
   }
   return 500;
+}
+
+ErrorCode error_code_of(int http_status) {
+  switch (http_status) {
+    case 400:
+      return ErrorCode::kInvalidArgument;
+    case 404:
+      return ErrorCode::kNotFound;
+    case 409:
+      return ErrorCode::kInsufficientData;
+    case 413:
+    case 503:
+      return ErrorCode::kLimitExceeded;
+    case 501:
+      return ErrorCode::kUnsupported;
+    case 507:
+      return ErrorCode::kNoSpace;
+    default:
+      return ErrorCode::kIo;
+  }
 }
 
 }  // namespace trigmesh

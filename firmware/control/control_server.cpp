@@ -17,7 +17,9 @@
 #include "firmware/base/check.hpp"
 #include "firmware/base/file_bytes.hpp"
 #include "firmware/control/control_json.hpp"
+#include "firmware/control/control_parse.hpp"
 #include "firmware/control/event_log.hpp"
+#include "firmware/session/session_id.hpp"
 
 namespace trigmesh {
 namespace {
@@ -125,6 +127,8 @@ class ControlServer::Impl {
       std::this_thread::yield();
     }
     server_.stop();
+    // The library leaves a socket open that it never served: nobody shall find it and wait.
+    (void)::unlink(options_.socket_path.c_str());
   }
 
   EventLog& events() { return events_; }
@@ -132,25 +136,25 @@ class ControlServer::Impl {
  private:
   void add_routes() {
     server_.Get("/v1/status", [this](const httplib::Request&, httplib::Response& response) {
-      answer(response, target_.status().map(render_status));
-    });
-    server_.Get("/v1/sessions", [this](const httplib::Request&, httplib::Response& response) {
-      answer(response, target_.sessions().map([](const std::vector<SessionInfo>& sessions) {
-        return render_sessions(sessions);
+      answer(response, target_.status().map([this](ControlStatus status) {
+        status.last_event = events_.last_number();
+        return render_status(status);
       }));
     });
-    server_.Post("/v1/start", [this](const httplib::Request&, httplib::Response& response) {
-      answer_done(response, target_.start());
-    });
-    server_.Post("/v1/finish", [this](const httplib::Request&, httplib::Response& response) {
-      answer_done(response, target_.finish());
-    });
-    server_.Post("/v1/still", [this](const httplib::Request&, httplib::Response& response) {
-      answer_done(response, target_.still());
+    server_.Get("/v1/devices", [this](const httplib::Request&, httplib::Response& response) {
+      answer(response, target_.devices().map([](const std::vector<DeviceInfo>& devices) {
+        return render_devices(devices);
+      }));
     });
     server_.Get("/v1/events", [this](const httplib::Request& request, httplib::Response& response) {
       watch(request, response);
     });
+    add_command("/v1/start", &ControlTarget::start);
+    add_command("/v1/finish", &ControlTarget::finish);
+    add_command("/v1/still", &ControlTarget::still);
+    add_command("/v1/undo", &ControlTarget::undo);
+    add_command("/v1/cancel", &ControlTarget::cancel_model);
+    add_session_routes();
     server_.set_error_handler([](const httplib::Request& request, httplib::Response& response) {
       if (response.body.empty()) {
         answer_error(response,
@@ -158,6 +162,43 @@ class ControlServer::Impl {
                      fmt::format("{} {} cannot be done", request.method, request.path));
       }
     });
+  }
+
+  void add_command(const char* path, Result<> (ControlTarget::*command)()) {
+    server_.Post(path, [this, command](const httplib::Request&, httplib::Response& response) {
+      answer_done(response, (target_.*command)());
+    });
+  }
+
+  void add_session_routes() {
+    server_.Get("/v1/sessions", [this](const httplib::Request&, httplib::Response& response) {
+      answer(response, target_.sessions().map([](const std::vector<SessionInfo>& sessions) {
+        return render_sessions(sessions);
+      }));
+    });
+    server_.Post("/v1/sessions/([^/]+)/export",
+                 [this](const httplib::Request& request, httplib::Response& response) {
+                   answer(response, export_session(request.matches[1], request.body));
+                 });
+    server_.Delete("/v1/sessions/([^/]+)",
+                   [this](const httplib::Request& request, httplib::Response& response) {
+                     const std::string id = request.matches[1];
+                     answer_done(response,
+                                 check_id(id).and_then([&] { return target_.remove_session(id); }));
+                   });
+  }
+
+  [[nodiscard]] static Result<> check_id(const std::string& id) {
+    if (!is_session_id(id)) {
+      return fail(ErrorCode::kInvalidArgument, "'{}' is not the id of a session", id);
+    }
+    return {};
+  }
+
+  [[nodiscard]] Result<std::string> export_session(const std::string& id, std::string_view body) {
+    TM_RETURN_IF_ERROR(check_id(id));
+    TM_ASSIGN_OR_RETURN(const std::filesystem::path destination, parse_export_request(body));
+    return target_.export_session(id, destination).map(render_export);
   }
 
   void watch(const httplib::Request& request, httplib::Response& response) {

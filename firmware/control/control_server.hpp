@@ -14,7 +14,7 @@ namespace trigmesh {
 struct ControlOptions {
   /// Of the unix socket; what is there is replaced. Who may connect is decided by the folder.
   std::filesystem::path socket_path;
-  /// Largest body of a request, bytes; no request needs one. Larger ones get 413.
+  /// Largest body of a request, bytes; a path fits. Larger ones get 413.
   std::size_t max_body_bytes = 4096;
   /// Watchers of events at once; each holds a thread. More get 503. > 0.
   std::size_t max_watchers = 4;
@@ -27,8 +27,11 @@ struct ControlOptions {
 /// The rig over HTTP on a unix socket:
 ///
 ///     GET  /v1/status     what it is doing
-///     POST /v1/start, /v1/finish, /v1/still
+///     POST /v1/start, /v1/finish, /v1/still, /v1/undo, /v1/cancel
 ///     GET  /v1/sessions   the list
+///     POST /v1/sessions/ID/export   {"destination": "/media/stick"}; answers when it is done
+///     DELETE /v1/sessions/ID
+///     GET  /v1/devices    cameras and GPIO chips
 ///     GET  /v1/events     server-sent events, from now on or after the header Last-Event-ID
 ///
 /// Answers are JSON; a failure is {"error": ".."} with a fitting status. Used as

@@ -1,11 +1,13 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <vector>
 
 #include "firmware/base/result.hpp"
 #include "firmware/session/retention.hpp"
+#include "firmware/session/session_export.hpp"
 #include "firmware/session/state_machine.hpp"
 
 namespace trigmesh {
@@ -21,6 +23,22 @@ struct ControlStatus {
   std::uint32_t queued_models = 0;    ///< closed sessions that wait for their model
   std::uint64_t available_bytes = 0;  ///< that may still be captured
   std::string software_version;
+  std::string fault;              ///< what keeps it from capturing, one sentence; empty: nothing
+  std::string model_session_id;   ///< whose model is being made; empty: none
+  std::string model_stage;        ///< of its making: "mapping"
+  std::uint64_t model_done = 0;   ///< pieces of the stage that are finished
+  std::uint64_t model_total = 0;  ///< all pieces of the stage; 0: not known
+  std::uint64_t last_event = 0;   ///< number of the newest event; the server fills it in
+};
+
+/// Something that is plugged into the rig.
+struct DeviceInfo {
+  std::string kind;         ///< "camera", "gpio chip"
+  std::string stable_name;  ///< what settings call it: the same after a restart
+  std::string model;        ///< as it calls itself
+  std::string note;         ///< for people, e.g. "/dev/video0, in use"; may be empty
+
+  bool operator==(const DeviceInfo&) const = default;
 };
 
 /// What can be asked of the rig from outside. Called from several threads at once: thread-safe.
@@ -41,7 +59,21 @@ class ControlTarget {
   [[nodiscard]] virtual Result<> finish() = 0;
   /// One frame now.
   [[nodiscard]] virtual Result<> still() = 0;
+  /// Discards the frame of the open session that was kept last. kInsufficientData: there is none.
+  [[nodiscard]] virtual Result<> undo() = 0;
+  /// Ends the making of the model; the session stays without one. kInsufficientData: none is made.
+  [[nodiscard]] virtual Result<> cancel_model() = 0;
   [[nodiscard]] virtual Result<std::vector<SessionInfo>> sessions() = 0;
+  /// Removes a session with its model. kInvalidArgument (no id), kNotFound, kInsufficientData: it
+  /// is open, its model is being made or it is being exported.
+  [[nodiscard]] virtual Result<> remove_session(const std::string& id) = 0;
+  /// A verified copy in the folder `destination` (absolute). Returns when it is done, which takes
+  /// as long as the stick needs; tells events "export" meanwhile. Errors of export_session, and
+  /// kInsufficientData: the session is open, or another export is on its way.
+  [[nodiscard]] virtual Result<ExportReport> export_session(
+      const std::string& id, const std::filesystem::path& destination) = 0;
+  /// Cameras and GPIO chips that are there.
+  [[nodiscard]] virtual Result<std::vector<DeviceInfo>> devices() = 0;
 };
 
 }  // namespace trigmesh

@@ -1,10 +1,5 @@
-#include <atomic>
-#include <filesystem>
 #include <memory>
-#include <optional>
 #include <string>
-#include <thread>
-#include <vector>
 
 #include <httplib.h>
 #include <sys/socket.h>
@@ -13,51 +8,22 @@
 #include <gtest/gtest.h>
 
 #include "firmware/control/control_server.hpp"
+#include "tests/integration/fake_rig.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace trigmesh {
 namespace {
 
+using test_support::kReadySession;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 
-/// A rig that counts what it is asked.
-class CountingTarget final : public ControlTarget {
- public:
-  Result<ControlStatus> status() override {
-    ControlStatus status;
-    status.frames = static_cast<std::uint32_t>(stills.load());
-    return status;
-  }
-
-  Result<> start() override { return fail(ErrorCode::kNoSpace, "the disk is full"); }
-
-  Result<> finish() override { return fail(ErrorCode::kInsufficientData, "nothing is open"); }
-
-  Result<> still() override {
-    ++stills;
-    return {};
-  }
-
-  Result<std::vector<SessionInfo>> sessions() override { return std::vector<SessionInfo>(1); }
-
-  std::atomic<int> stills = 0;
-};
+constexpr const char* kJson = "application/json";
 
 class Control : public ::testing::Test {
  protected:
-  Control() {
-    options_.socket_path = temporary_.path() / "control";
-    options_.max_watchers = 1;
-    auto server = ControlServer::create(target_, options_);
-    EXPECT_TRUE(server) << server.error().message;
-    server_ = std::move(*server);
-    thread_.emplace([this] { EXPECT_TRUE(server_->run()); });
-  }
-
-  ~Control() override {
-    server_->stop();
-    thread_.reset();
-  }
+  Control() : options_{.socket_path = temporary_.path() / "control", .max_watchers = 1} {}
 
   [[nodiscard]] std::unique_ptr<httplib::Client> client() const {
     auto client = std::make_unique<httplib::Client>(options_.socket_path.string());
@@ -67,29 +33,66 @@ class Control : public ::testing::Test {
   }
 
   const test_support::TemporaryFolder temporary_;
-  ControlOptions options_;
-  CountingTarget target_;
-  std::unique_ptr<ControlServer> server_;
-  std::optional<std::jthread> thread_;
+  const ControlOptions options_;
+  test_support::ServedRig served_{options_};
+  ControlServer& server_ = served_.server();
 };
 
 TEST_F(Control, PassesCommandsOnAndAnswers) {
-  const auto taken = client()->Post("/v1/still");
-  ASSERT_TRUE(taken) << httplib::to_string(taken.error());
-  EXPECT_EQ(taken->status, 200);
-  EXPECT_EQ(target_.stills, 1);
+  for (const char* command : {"start", "still", "undo", "finish", "cancel"}) {
+    const auto taken = client()->Post(std::string("/v1/") + command);
+    ASSERT_TRUE(taken) << httplib::to_string(taken.error());
+    EXPECT_EQ(taken->status, 200);
+    EXPECT_EQ(taken->body, "{}");
+  }
+  EXPECT_THAT(served_.rig().asked(), ElementsAre("start", "still", "undo", "finish", "cancel"));
+}
+
+TEST_F(Control, SaysWhatThereIs) {
+  server_.publish("phase", "{}");
   const auto status = client()->Get("/v1/status");
   ASSERT_TRUE(status);
-  EXPECT_THAT(status->body, HasSubstr("\"frames\":1"));
+  EXPECT_THAT(status->body, HasSubstr("\"last_event\":1"));
   EXPECT_EQ(status->get_header_value("Content-Type"), "application/json");
-  EXPECT_THAT(client()->Get("/v1/sessions")->body, HasSubstr("\"size_bytes\":0"));
+  EXPECT_THAT(client()->Get("/v1/sessions")->body, HasSubstr("\"size_bytes\":999"));
+  EXPECT_THAT(client()->Get("/v1/devices")->body, HasSubstr("\"name\":\"gpiochip0\""));
+}
+
+TEST_F(Control, RemovesAndExportsASession) {
+  const std::string session = std::string("/v1/sessions/") + kReadySession;
+  const auto exported =
+      client()->Post(session + "/export", R"({"destination":"/media/stick"})", kJson);
+  ASSERT_TRUE(exported);
+  EXPECT_EQ(exported->status, 200);
+  EXPECT_THAT(exported->body, HasSubstr("\"files\":15"));
+  EXPECT_EQ(client()->Delete(session)->status, 200);
+  EXPECT_THAT(served_.rig().asked(),
+              ElementsAre(std::string("export ") + kReadySession + " /media/stick",
+                          std::string("remove ") + kReadySession));
+}
+
+TEST_F(Control, RefusesWrongIdsAndRequestsBeforeTheRigSeesThem) {
+  const std::string request = R"({"destination":"/media/stick"})";
+  EXPECT_EQ(client()->Delete("/v1/sessions/..")->status, 400);
+  EXPECT_EQ(client()->Delete("/v1/sessions/20240229T235959Z-00ff0g")->status, 400);
+  EXPECT_EQ(client()->Post("/v1/sessions/x/export", request, kJson)->status, 400);
+  EXPECT_EQ(client()->Delete("/v1/sessions/20240229T235959Z-000000")->status, 404);
+  const std::string session = std::string("/v1/sessions/") + kReadySession;
+  for (const char* wrong : {"", "{", R"({"destination":"stick"})", R"({"destination":7})"}) {
+    EXPECT_EQ(client()->Post(session + "/export", wrong, kJson)->status, 400) << wrong;
+  }
+  EXPECT_EQ(client()->Get(session + "/export")->status, 404);
+  EXPECT_EQ(client()->Delete("/v1/sessions/" + std::string(3000, 'x'))->status, 400);
+  EXPECT_THAT(served_.rig().asked(), IsEmpty());
 }
 
 TEST_F(Control, SaysWhyNot) {
+  served_.rig().refuse_with(Error{ErrorCode::kNoSpace, "the disk is full"});
   const auto full = client()->Post("/v1/start");
   ASSERT_TRUE(full);
   EXPECT_EQ(full->status, 507);
   EXPECT_EQ(full->body, R"({"error":"the disk is full"})");
+  served_.rig().refuse_with(Error{ErrorCode::kInsufficientData, "nothing is open"});
   EXPECT_EQ(client()->Post("/v1/finish")->status, 409);
 }
 
@@ -99,11 +102,23 @@ TEST_F(Control, RefusesWhatIsUnknownOrTooLarge) {
   const std::string body(options_.max_body_bytes + 1, 'x');
   const auto refused = client()->Post("/v1/still", body, "text/plain");
   EXPECT_TRUE(!refused || refused->status == 413);
-  EXPECT_EQ(target_.stills, 0);
+  EXPECT_THAT(served_.rig().asked(), IsEmpty());
+}
+
+TEST_F(Control, AnswersOthersDuringALongExport) {
+  std::string seen;
+  served_.rig().on_command([&](const std::string&) { seen = client()->Get("/v1/status")->body; });
+  EXPECT_EQ(client()
+                ->Post(std::string("/v1/sessions/") + kReadySession + "/export",
+                       R"({"destination":"/media/stick"})",
+                       kJson)
+                ->status,
+            200);
+  EXPECT_THAT(seen, HasSubstr("\"phase\""));
 }
 
 TEST_F(Control, TellsWatchersWhatHappensAndBoundsTheirNumber) {
-  server_->publish("phase", R"({"phase":"working"})");
+  server_.publish("phase", R"({"phase":"working"})");
   std::string seen;
   int second_status = 0;
   const httplib::Headers from_the_beginning = {{"Last-Event-ID", "0"}};
@@ -111,7 +126,7 @@ TEST_F(Control, TellsWatchersWhatHappensAndBoundsTheirNumber) {
     seen.append(data, size);
     if (second_status == 0) {
       second_status = client()->Get("/v1/events")->status;
-      server_->publish("progress", R"({"ratio":0.5})");
+      server_.publish("progress", R"({"ratio":0.5})");
     }
     return seen.find("progress") == std::string::npos;  // false: enough
   });
@@ -122,18 +137,18 @@ TEST_F(Control, TellsWatchersWhatHappensAndBoundsTheirNumber) {
 }
 
 TEST_F(Control, StoppingEndsWatching) {
-  server_->publish("phase", "{}");
+  server_.publish("phase", "{}");
   const httplib::Headers from_the_beginning = {{"Last-Event-ID", "0"}};
   (void)client()->Get("/v1/events", from_the_beginning, [&](const char*, std::size_t) {
-    server_->stop();
+    server_.stop();
     return true;
   });
-  thread_.reset();  // would wait for ever
+  served_.stop();  // would wait for ever
 }
 
 TEST(ControlServer, StopsBeforeItHasBegun) {
   const test_support::TemporaryFolder temporary;
-  CountingTarget target;
+  test_support::FakeRig target;
   auto server = ControlServer::create(target, {.socket_path = temporary.path() / "control"});
   ASSERT_TRUE(server) << server.error().message;
   (*server)->stop();
@@ -141,7 +156,7 @@ TEST(ControlServer, StopsBeforeItHasBegun) {
 }
 
 TEST(ControlServer, SaysWhereItCannotListen) {
-  CountingTarget target;
+  test_support::FakeRig target;
   const auto missing = ControlServer::create(target, {.socket_path = "/nonexistent/control"});
   ASSERT_FALSE(missing);
   EXPECT_THAT(missing.error().message, HasSubstr("/nonexistent/control"));

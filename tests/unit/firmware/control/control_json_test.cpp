@@ -21,7 +21,8 @@ TEST(ControlJson, SaysWhatTheRigDoes) {
   EXPECT_EQ(render_status(status),
             R"({"phase":"capturing","camera_present":true,"storage":"low",)"
             R"("session":"20240229T235959Z-00ff00","frames":3,"job":"paused","queued_models":1,)"
-            R"("available_bytes":5,"software_version":"1.0"})");
+            R"("available_bytes":5,"software_version":"1.0","fault":"","model_session":"",)"
+            R"("model_stage":"","model_done":0,"model_total":0,"last_event":0})");
 }
 
 TEST(ControlJson, ListsSessions) {
@@ -38,6 +39,13 @@ TEST(ControlJson, ListsSessions) {
   EXPECT_EQ(render_sessions({}), "[]");
 }
 
+TEST(ControlJson, ListsDevices) {
+  const DeviceInfo camera{"camera", "usb-Example-video-index0", "Example", "/dev/video0"};
+  EXPECT_EQ(render_devices(std::vector{camera}),
+            R"([{"kind":"camera","name":"usb-Example-video-index0","model":"Example",)"
+            R"("note":"/dev/video0"}])");
+}
+
 TEST(ControlJson, KeepsErrorsOnOneLine) {
   EXPECT_EQ(render_error("a \"b\"\nc"), R"({"error":"a \"b\"\nc"})");
 }
@@ -47,6 +55,18 @@ TEST(ControlJson, TellsACallerWhatHeCanDo) {
   EXPECT_EQ(http_status_of(ErrorCode::kInsufficientData), 409);
   EXPECT_EQ(http_status_of(ErrorCode::kNoSpace), 507);
   EXPECT_EQ(http_status_of(ErrorCode::kIo), 500);
+}
+
+TEST(ControlJson, GivesAClientTheErrorBackForItsExitCode) {
+  for (const ErrorCode code : {ErrorCode::kInvalidArgument,
+                               ErrorCode::kNotFound,
+                               ErrorCode::kInsufficientData,
+                               ErrorCode::kLimitExceeded,
+                               ErrorCode::kNoSpace,
+                               ErrorCode::kUnsupported,
+                               ErrorCode::kIo}) {
+    EXPECT_EQ(error_code_of(http_status_of(code)), code);
+  }
 }
 
 }  // namespace
