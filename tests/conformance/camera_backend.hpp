@@ -28,8 +28,8 @@ struct CameraBackend {
 };
 
 /// Backends that run here: replay and mock always; v4l2 and libcamera when the environment names a
-/// device (TRIGMESH_TEST_V4L2=/dev/video0, TRIGMESH_TEST_LIBCAMERA=name). Those that do not run are
-/// named in `skipped` with the reason.
+/// device (TRIGMESH_TEST_V4L2=/dev/video0, TRIGMESH_TEST_LIBCAMERA=NAME or first). Those that do
+/// not run are named in `skipped` with the reason.
 struct CameraBackends {
   std::vector<CameraBackend> running;
   std::vector<std::string> skipped;

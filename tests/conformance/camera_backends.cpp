@@ -5,6 +5,9 @@
 
 #include <gtest/gtest.h>
 
+#ifdef TRIGMESH_WITH_LIBCAMERA
+#include "drivers/camera/libcamera/libcamera_source.hpp"
+#endif
 #include "drivers/camera/mock/mock_source.hpp"
 #include "drivers/camera/replay/replay_source.hpp"
 #include "drivers/camera/v4l2/v4l2_source.hpp"
@@ -78,6 +81,31 @@ void add_v4l2(CameraBackends& backends) {
       {.name = "v4l2", .is_scripted = false, .loses_frames = true, .make = make});
 }
 
+#ifdef TRIGMESH_WITH_LIBCAMERA
+void add_libcamera(CameraBackends& backends) {
+  const char* camera = std::getenv("TRIGMESH_TEST_LIBCAMERA");
+  if (camera == nullptr) {
+    backends.skipped.emplace_back("libcamera: TRIGMESH_TEST_LIBCAMERA names no camera");
+    return;
+  }
+  const std::string name = std::string_view(camera) == "first" ? "" : camera;
+  const auto make = [name](const CameraWish&) {
+    LibcameraOptions options;
+    options.camera = name;
+    options.wish = {.width_px = 640, .height_px = 480, .rate_hz = 30.0, .format = {}};
+    auto source = LibcameraSource::create(options, kClock);
+    EXPECT_TRUE(source) << source.error().message;
+    return std::unique_ptr<FrameSource>(*std::move(source));
+  };
+  backends.running.push_back(
+      {.name = "libcamera", .is_scripted = false, .loses_frames = true, .make = make});
+}
+#else
+void add_libcamera(CameraBackends& backends) {
+  backends.skipped.emplace_back("libcamera: not in this build (TRIGMESH_WITH_LIBCAMERA)");
+}
+#endif
+
 CameraBackends find_backends() {
   CameraBackends backends;
   backends.running.push_back(
@@ -85,6 +113,7 @@ CameraBackends find_backends() {
   backends.running.push_back(
       {.name = "mock", .is_scripted = true, .loses_frames = true, .make = make_mock});
   add_v4l2(backends);
+  add_libcamera(backends);
   return backends;
 }
 

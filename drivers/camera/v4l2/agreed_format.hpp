@@ -1,13 +1,10 @@
 #pragma once
 
 #include <chrono>
-#include <cstddef>
-#include <cstdint>
-#include <span>
 #include <string>
 
+#include "drivers/camera/camera_mode.hpp"
 #include "drivers/camera/pixel_format.hpp"
-#include "drivers/camera/v4l2/camera_mode.hpp"
 #include "drivers/camera/v4l2/kernel.hpp"
 #include "drivers/device/device_fault.hpp"
 
@@ -27,11 +24,5 @@ struct AgreedFormat {
                                                          int fd,
                                                          const CameraMode& mode,
                                                          const std::string& camera);
-
-/// The bytes of a buffer that are the picture. Raw: from the first pixel to the last, padding
-/// included. JPEG: up to its end, without what cameras leave behind it. kShortFrame: fewer bytes
-/// than the picture needs; kCorruptFrame: no whole JPEG, or one of another size than was agreed.
-[[nodiscard]] DeviceResult<std::span<const std::uint8_t>> picture_in(
-    std::span<const std::uint8_t> bytes, const FrameLayout& layout);
 
 }  // namespace trigmesh

@@ -32,25 +32,6 @@ const ControlCode& code_of(ControlId id) {
   return kCodes[static_cast<std::size_t>(id)];
 }
 
-/// Automatisms and what each of them steers.
-constexpr std::array<std::pair<ControlId, ControlId>, 4> kPairs = {{
-    {ControlId::kExposureAuto, ControlId::kExposure},
-    {ControlId::kGainAuto, ControlId::kGain},
-    {ControlId::kWhiteBalanceAuto, ControlId::kWhiteBalance},
-    {ControlId::kFocusAuto, ControlId::kFocus},
-}};
-
-bool is_automatism(ControlId id) {
-  return std::any_of(
-      kPairs.begin(), kPairs.end(), [id](const auto& pair) { return pair.first == id; });
-}
-
-const ControlValue* find_value(const std::vector<ControlValue>& values, ControlId id) {
-  const auto found = std::find_if(
-      values.begin(), values.end(), [id](const ControlValue& value) { return value.id == id; });
-  return found == values.end() ? nullptr : &*found;
-}
-
 /// EINVAL and ERANGE are about the value, EACCES and EBUSY about a control that something else
 /// steers now; the rest is about the device.
 tl::unexpected<DeviceFault> refused(int error, ControlId id, const std::string& camera) {
@@ -183,82 +164,8 @@ DeviceResult<std::int64_t> V4l2Controls::set(ControlId id, std::int64_t value) {
   return taken;
 }
 
-DeviceResult<> V4l2Controls::hold(ControlId id, std::optional<std::int64_t> wanted) {
-  if (!wanted) {
-    TM_ASSIGN_OR_FAULT(wanted, get(id));
-  }
-  TM_ASSIGN_OR_FAULT(const std::int64_t taken, set(id, *wanted));
-  held_.push_back({id, taken});
-  return {};
-}
-
-DeviceResult<std::vector<ControlValue>> V4l2Controls::lock(
-    const std::vector<ControlValue>& wanted) {
-  held_.clear();
-  for (const ControlValue& value : wanted) {
-    TM_ASSIGN_OR_FAULT(const std::optional<ControlRange> range, find(value.id));
-    if (!range || is_automatism(value.id)) {
-      return device_fault(FaultKind::kControlRefused,
-                          "cannot hold the control '{}' of camera {} at {}: {}",
-                          to_string(value.id),
-                          camera_,
-                          value.value,
-                          range ? "a lock turns automatisms off" : "it has no such control");
-    }
-  }
-  for (const auto& [automatism, steered] : kPairs) {
-    TM_ASSIGN_OR_FAULT(const std::optional<ControlRange> is_steered, find(steered));
-    TM_ASSIGN_OR_FAULT(const std::optional<ControlRange> is_automatic, find(automatism));
-    const ControlValue* given = find_value(wanted, steered);
-    std::optional<std::int64_t> value =
-        given != nullptr ? std::optional(given->value) : std::nullopt;
-    if (is_steered && !value) {
-      // Read while the automatism still holds it: some cameras forget it when that goes off.
-      TM_ASSIGN_OR_FAULT(value, get(steered));
-    }
-    if (is_automatic) {
-      TM_RETURN_IF_FAULT(hold(automatism, 0));
-    }
-    if (is_steered) {
-      TM_RETURN_IF_FAULT(hold(steered, value));
-    }
-  }
-  return held_;
-}
-
-DeviceResult<> V4l2Controls::check_lock() {
-  for (const ControlValue& held : held_) {
-    TM_ASSIGN_OR_FAULT(const std::int64_t now, get(held.id));
-    if (now != held.value) {
-      return device_fault(FaultKind::kControlRefused,
-                          "camera {} did not keep its control '{}': held at {}, now {}",
-                          camera_,
-                          to_string(held.id),
-                          held.value,
-                          now);
-    }
-  }
-  return {};
-}
-
-DeviceResult<> V4l2Controls::restore_lock() {
-  for (const ControlValue& held : held_) {
-    TM_ASSIGN_OR_FAULT(const std::int64_t taken, set(held.id, held.value));
-    if (taken != held.value) {
-      return device_fault(
-          FaultKind::kControlRefused,
-          "camera {} came back and does not take its control '{}' at {}: it says {}",
-          camera_,
-          to_string(held.id),
-          held.value,
-          taken);
-    }
-  }
-  return {};
-}
-
 std::optional<std::chrono::nanoseconds> V4l2Controls::held_exposure() const {
-  const ControlValue* exposure = find_value(held_, ControlId::kExposure);
+  const ControlValue* exposure = find_value(lock_.held(), ControlId::kExposure);
   return exposure != nullptr
              ? std::optional<std::chrono::nanoseconds>(std::chrono::microseconds(exposure->value))
              : std::nullopt;

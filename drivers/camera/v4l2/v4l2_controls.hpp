@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "drivers/camera/camera_controls.hpp"
+#include "drivers/camera/control_lock.hpp"
 #include "drivers/camera/v4l2/kernel.hpp"
 
 namespace trigmesh {
@@ -26,12 +27,16 @@ class V4l2Controls final : public CameraControls {
   [[nodiscard]] DeviceResult<std::vector<ControlRange>> list() override;
   [[nodiscard]] DeviceResult<std::int64_t> get(ControlId id) override;
   [[nodiscard]] DeviceResult<std::int64_t> set(ControlId id, std::int64_t value) override;
+
   [[nodiscard]] DeviceResult<std::vector<ControlValue>> lock(
-      const std::vector<ControlValue>& wanted) override;
-  [[nodiscard]] DeviceResult<> check_lock() override;
+      const std::vector<ControlValue>& wanted) override {
+    return lock_.lock(*this, camera_, wanted);
+  }
+
+  [[nodiscard]] DeviceResult<> check_lock() override { return lock_.check(*this, camera_); }
 
   /// Sets what lock() held on the device that is attached now; nothing when nothing was locked.
-  [[nodiscard]] DeviceResult<> restore_lock();
+  [[nodiscard]] DeviceResult<> restore_lock() { return lock_.restore(*this, camera_); }
 
   /// The exposure that is held, when one is.
   [[nodiscard]] std::optional<std::chrono::nanoseconds> held_exposure() const;
@@ -39,13 +44,12 @@ class V4l2Controls final : public CameraControls {
  private:
   /// Nothing when the camera does not have it.
   [[nodiscard]] DeviceResult<std::optional<ControlRange>> find(ControlId id);
-  [[nodiscard]] DeviceResult<> hold(ControlId id, std::optional<std::int64_t> wanted);
   [[nodiscard]] DeviceResult<std::int64_t> automatic_exposure_value();
 
   const std::shared_ptr<Kernel> kernel_;  // shared with the source and its buffers
   int fd_ = -1;
   std::string camera_;
-  std::vector<ControlValue> held_;
+  ControlLock lock_;
 };
 
 }  // namespace trigmesh

@@ -6,8 +6,10 @@
 
 #include <poll.h>
 
+#include "drivers/camera/picture_in.hpp"
 #include "drivers/camera/v4l2/agreed_format.hpp"
 #include "drivers/camera/v4l2/camera_list.hpp"
+#include "drivers/camera/v4l2/camera_mode.hpp"
 
 namespace trigmesh {
 namespace {

@@ -6,9 +6,9 @@
 #include <optional>
 #include <string>
 
+#include "drivers/camera/camera_mode.hpp"
+#include "drivers/camera/frame_sequence.hpp"
 #include "drivers/camera/frame_source.hpp"
-#include "drivers/camera/v4l2/camera_mode.hpp"
-#include "drivers/camera/v4l2/frame_sequence.hpp"
 #include "drivers/camera/v4l2/kernel.hpp"
 #include "drivers/camera/v4l2/mapped_buffers.hpp"
 #include "drivers/camera/v4l2/v4l2_controls.hpp"

@@ -1,4 +1,4 @@
-#include "drivers/camera/v4l2/frame_sequence.hpp"
+#include "drivers/camera/frame_sequence.hpp"
 
 #include <gtest/gtest.h>
 
