@@ -49,7 +49,7 @@ class Machine:
         for overlay in self.disks:
             command += ["-drive", f"file={overlay},format=qcow2,if=virtio,discard=unmap"]
         if state is not None:
-            command += ["-incoming", f"exec:cat {state}"]
+            command += ["-incoming", "defer"]
         self._log = open(self.folder / "qemu.log", "wb")
         self._qemu = subprocess.Popen([str(word) for word in command], stdin=subprocess.DEVNULL, stdout=self._log,
                                       stderr=subprocess.STDOUT, start_new_session=True)
@@ -63,6 +63,7 @@ class Machine:
             if state is None:
                 self._read_answer(b"=ready\n", BOOT_PATIENCE_S)
             else:
+                self.monitor("migrate-incoming", uri=f"exec:cat {state}")
                 self._wait_until(lambda: self.monitor("query-status")["status"] == "paused", 60, "take up its state")
                 self.monitor("cont")
         except BaseException:
