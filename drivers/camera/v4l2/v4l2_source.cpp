@@ -10,6 +10,7 @@
 #include "drivers/camera/v4l2/agreed_format.hpp"
 #include "drivers/camera/v4l2/camera_list.hpp"
 #include "drivers/camera/v4l2/camera_mode.hpp"
+#include "drivers/camera/v4l2/input_signal.hpp"
 
 namespace trigmesh {
 namespace {
@@ -75,6 +76,8 @@ DeviceResult<> V4l2Source::open_and_start() {
     return tl::unexpected<DeviceFault>(
         fault_of_errno(-device.get(), "cannot open camera", node.path));
   }
+  watch_signal(*kernel_, device.get());
+  TM_RETURN_IF_FAULT(check_signal(*kernel_, device.get(), node.path));
   const std::vector<CameraMode> modes = list_modes(*kernel_, device.get(), options_.wish);
   TM_ASSIGN_OR_FAULT(const CameraMode mode, choose_mode(modes, options_.wish, node.path));
   TM_ASSIGN_OR_FAULT(const AgreedFormat agreed,
@@ -177,10 +180,13 @@ std::optional<FrameEvent> V4l2Source::wait_for_device(std::chrono::nanoseconds d
   }
   // Also while frames hold all buffers: the first that is released is filled and wakes us.
   std::array<pollfd, 2> entries = {pollfd{stop_requested_.fd(), POLLIN, 0},
-                                   pollfd{buffers_->fd(), POLLIN, 0}};
+                                   pollfd{buffers_->fd(), POLLIN | POLLPRI, 0}};
   const int ready = kernel_->poll(entries, poll_milliseconds(deadline - now));
   if (ready < 0 && ready != -EINTR) {
     return refuse(fault_of_errno(-ready, "cannot wait for camera", info_.stable_name));
+  }
+  if (ready > 0 && (entries[1].revents & POLLPRI) != 0) {
+    return look_at_signal();
   }
   if (ready <= 0 || (entries[1].revents & (POLLERR | POLLHUP | POLLNVAL)) == 0) {
     return std::nullopt;
@@ -192,6 +198,16 @@ std::optional<FrameEvent> V4l2Source::wait_for_device(std::chrono::nanoseconds d
   return refuse({FaultKind::kIo,
                  fmt::format("the driver of camera {} reports an error and does not tell which",
                              info_.stable_name)});
+}
+
+std::optional<FrameEvent> V4l2Source::look_at_signal() {
+  if (take_signal_changes(*kernel_, buffers_->fd())) {
+    DeviceResult<> signal = check_signal(*kernel_, buffers_->fd(), info_.stable_name);
+    if (!signal) {
+      return refuse(std::move(signal).error());
+    }
+  }
+  return std::nullopt;
 }
 
 DeviceFault V4l2Source::silence() const {

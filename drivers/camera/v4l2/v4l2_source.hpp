@@ -46,8 +46,8 @@ class V4l2Source final : public FrameSource {
   V4l2Source(V4l2Source&&) = delete;
   V4l2Source& operator=(V4l2Source&&) = delete;
 
-  /// kNotFound, kPermission, kBusy, kFormatRefused; kControlRefused when a lock of the session
-  /// cannot be restored; kDisconnected and kIo when it fails on the way.
+  /// kNotFound, kPermission, kBusy, kNoSignal, kFormatRefused; kControlRefused when a lock of the
+  /// session cannot be restored; kDisconnected and kIo when it fails on the way.
   [[nodiscard]] DeviceResult<> start() override;
   void stop() override;
   [[nodiscard]] FrameEvent wait(std::chrono::nanoseconds timeout) override;
@@ -70,6 +70,8 @@ class V4l2Source final : public FrameSource {
   void stamp(const FilledBuffer& filled, FrameInfo& info);
   /// Nothing when it is worth looking for a frame.
   [[nodiscard]] std::optional<FrameEvent> wait_for_device(std::chrono::nanoseconds deadline);
+  /// A fault when the driver tells that its input has lost the signal.
+  [[nodiscard]] std::optional<FrameEvent> look_at_signal();
   [[nodiscard]] FrameEvent refuse(DeviceFault fault);
   [[nodiscard]] DeviceFault silence() const;
 

@@ -6,6 +6,12 @@
 #include <gtest/gtest.h>
 
 namespace trigmesh::test_support {
+namespace {
+
+/// The input that is selected, of several.
+constexpr int kInput = 3;
+
+}  // namespace
 
 int FakeKernel::open(const std::string& path) {
   if (!is_plugged || path != "/dev/video0") {
@@ -78,6 +84,19 @@ int FakeKernel::answer(unsigned long request, void* argument) {
       waiting_.clear();
       queued = 0;
       return 0;
+    case VIDIOC_G_INPUT:
+      *static_cast<int*>(argument) = kInput;
+      return has_inputs ? 0 : -ENOTTY;
+    case VIDIOC_ENUMINPUT:
+      EXPECT_EQ(static_cast<const v4l2_input*>(argument)->index, __u32{kInput});
+      static_cast<v4l2_input*>(argument)->status = input_status;
+      return 0;
+    case VIDIOC_SUBSCRIBE_EVENT:
+      tells_signal_changes =
+          has_inputs && static_cast<const v4l2_event_subscription*>(argument)->id == kInput;
+      return has_inputs ? 0 : -EINVAL;
+    case VIDIOC_DQEVENT:
+      return take_event(*static_cast<v4l2_event*>(argument));
     case VIDIOC_QUERYCTRL:
       return query_control(*static_cast<v4l2_queryctrl*>(argument));
     case VIDIOC_QUERYMENU: {
@@ -201,6 +220,15 @@ int FakeKernel::dequeue(v4l2_buffer& buffer) {
   return 0;
 }
 
+int FakeKernel::take_event(v4l2_event& event) {
+  if (signal_changes == 0) {
+    return -ENOENT;
+  }
+  --signal_changes;
+  event.type = V4L2_EVENT_SOURCE_CHANGE;
+  return 0;
+}
+
 int FakeKernel::query_control(v4l2_queryctrl& query) const {
   const auto found = controls.find(query.id);
   if (found == controls.end()) {
@@ -233,6 +261,10 @@ int FakeKernel::poll(std::span<pollfd> descriptors, int timeout_ms) {
       ready += ::poll(&entry, 1, 0);  // the stop request is a real descriptor
     } else if (!is_plugged) {
       entry.revents = POLLERR | POLLHUP;
+      ++ready;
+    } else if (tells_signal_changes && signal_changes > 0) {
+      EXPECT_NE(entry.events & POLLPRI, 0) << "nobody looks at the events";
+      entry.revents = POLLPRI;
       ++ready;
     } else if (poll_events != 0 || !frames.empty()) {
       entry.revents = poll_events != 0 ? poll_events : short{POLLIN};

@@ -69,6 +69,9 @@ class FakeKernel final : public Kernel {
   __u32 forced_fourcc = 0;
   __u32 forced_field = 0;
   bool is_plugged = true;
+  bool has_inputs = false;
+  __u32 input_status = 0;
+  int signal_changes = 0;  ///< events that wait to be taken, once they are subscribed to
   int open_error = 0;
   int map_error = 0;
   short poll_events = 0;                ///< reported for the device when it has no frame
@@ -84,6 +87,7 @@ class FakeKernel final : public Kernel {
   std::size_t queued = 0;
   std::size_t poll_count = 0;
   bool is_streaming = false;
+  bool tells_signal_changes = false;
   v4l2_fract interval{1, 30};
 
   [[nodiscard]] int open(const std::string& path) override;
@@ -105,6 +109,7 @@ class FakeKernel final : public Kernel {
   [[nodiscard]] int request_buffers(v4l2_requestbuffers& request);
   [[nodiscard]] int queue(const v4l2_buffer& buffer);
   [[nodiscard]] int dequeue(v4l2_buffer& buffer);
+  [[nodiscard]] int take_event(v4l2_event& event);
   [[nodiscard]] int query_control(v4l2_queryctrl& query) const;
   [[nodiscard]] int set_control(const v4l2_control& control);
 

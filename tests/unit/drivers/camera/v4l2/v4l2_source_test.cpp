@@ -144,6 +144,39 @@ TEST_F(V4l2SourceTest, UnplugWhileWaitingIsSeen) {
   EXPECT_TRUE(kernel_->open_fds.empty());
 }
 
+TEST_F(V4l2SourceTest, DoesNotStartWithoutASignal) {
+  kernel_->has_inputs = true;
+  kernel_->input_status = V4L2_IN_ST_NO_SIGNAL;
+  const auto source = make();
+  const auto started = source->start();
+  ASSERT_FALSE(started);
+  EXPECT_EQ(started.error().kind, FaultKind::kNoSignal);
+  EXPECT_TRUE(kernel_->open_fds.empty());
+  kernel_->input_status = 0;
+  EXPECT_TRUE(source->start());
+}
+
+TEST_F(V4l2SourceTest, TellsThatTheSignalWentAway) {
+  kernel_->has_inputs = true;
+  const auto source = make();
+  ASSERT_TRUE(source->start());
+  kernel_->input_status = V4L2_IN_ST_NO_SYNC;
+  kernel_->signal_changes = 2;
+  EXPECT_EQ(fault_of(source->wait(1s)), FaultKind::kNoSignal);
+  EXPECT_TRUE(kernel_->open_fds.empty()) << "the stream has ended";
+}
+
+TEST_F(V4l2SourceTest, GoesOnWhenTheSignalChangesAndIsThere) {
+  kernel_->has_inputs = true;
+  const auto source = make();
+  ASSERT_TRUE(source->start());
+  kernel_->signal_changes = 1;
+  EXPECT_EQ(fault_of(source->wait(1s)), FaultKind::kTimeout);
+  EXPECT_EQ(kernel_->signal_changes, 0);
+  kernel_->frames = {grey_frame(0)};
+  EXPECT_TRUE(std::holds_alternative<Frame>(source->wait(1s)));
+}
+
 TEST_F(V4l2SourceTest, FramesOutliveTheSource) {
   auto source = make();
   ASSERT_TRUE(source->start());
