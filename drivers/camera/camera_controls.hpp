@@ -30,6 +30,9 @@ struct ControlRange {
   std::int64_t maximum = 0;
   std::int64_t step = 1;
   std::int64_t standard = 0;  ///< the device's default
+  /// The device's numbers in one unit that people use: a gain of 1, 1 dioptre, 1 kelvin. 0: it
+  /// counts something else. 1 also where its unit is not known.
+  std::int64_t per_unit = 1;
 };
 
 /// A control and the value it has.

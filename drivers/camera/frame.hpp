@@ -95,6 +95,12 @@ class Frame {
 
   [[nodiscard]] const FrameInfo& info() const { return info_; }
 
+  /// Another time for the same picture, for a recording that stands for a camera.
+  void set_time(std::chrono::nanoseconds timestamp, FrameMoment moment) {
+    info_.timestamp = timestamp;
+    info_.moment = moment;
+  }
+
   /// Encoded formats: the whole file. Raw formats: layout().height_px rows of layout().stride_bytes
   /// (NV12: then half as many rows of interleaved chroma).
   [[nodiscard]] std::span<const std::uint8_t> bytes() const { return bytes_; }

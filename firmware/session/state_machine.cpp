@@ -93,6 +93,13 @@ class Stepper {
     after_capture();
   }
 
+  void operator()(const ModelsFound& found) {
+    if (options_.makes_models) {
+      state_.queued += found.count;
+      after_capture();
+    }
+  }
+
   void operator()(const StartRequest&) {
     if (const auto reason = why_not_capture()) {
       refuse(*reason);
@@ -107,6 +114,8 @@ class Stepper {
   void operator()(const FinishRequest&) { finish(); }
 
   void operator()(const StillRequest& request) { take_still(request.time); }
+
+  void operator()(const UndoRequest&) { undo(); }
 
   void operator()(const StopRequest&) {
     state_.stopping = true;

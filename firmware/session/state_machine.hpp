@@ -87,6 +87,11 @@ struct JobFailed {};
 
 struct JobCancelled {};  ///< answers PauseJob; else the operator cancelled it, and it is over
 
+/// Closed sessions without a model were found: they wait for it.
+struct ModelsFound {
+  std::uint32_t count = 0;
+};
+
 struct StartRequest {};  ///< a command: begin a session, and in video mode stream
 
 struct FinishRequest {};  ///< a command: close the session
@@ -94,6 +99,8 @@ struct FinishRequest {};  ///< a command: close the session
 struct StillRequest {  ///< a command: one frame now
   std::chrono::nanoseconds time{};
 };
+
+struct UndoRequest {};  ///< a command: discard the last frame
 
 struct StopRequest {};  ///< the program shall end
 
@@ -111,9 +118,11 @@ using RigEvent = std::variant<Press,
                               JobDone,
                               JobFailed,
                               JobCancelled,
+                              ModelsFound,
                               StartRequest,
                               FinishRequest,
                               StillRequest,
+                              UndoRequest,
                               StopRequest>;
 
 enum class PressRefusal {

@@ -17,6 +17,7 @@ namespace trigmesh {
 struct CameraSettings {
   enum class Backend { kAuto, kV4l2, kLibcamera, kReplay };
   enum class Format { kAuto, kMjpg, kYuyv, kNv12, kGrey };
+  enum class ReplaySpeed { kRecorded, kFastest, kLockstep };
 
   Backend backend = Backend::kAuto;
   std::string device;
@@ -30,6 +31,7 @@ struct CameraSettings {
   double focus_dioptres = -1.0;
   bool lock_controls = true;
   std::string profile;
+  ReplaySpeed replay_speed = ReplaySpeed::kRecorded;
 
   bool operator==(const CameraSettings&) const = default;
 };
@@ -99,6 +101,7 @@ struct ReconstructionSettings {
   int threads = 0;
   int priority = 10;
   int seed = 0;
+  std::chrono::seconds stall_limit{900};
 
   bool operator==(const ReconstructionSettings&) const = default;
 };

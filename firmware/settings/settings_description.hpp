@@ -46,19 +46,33 @@ void visit_camera(CameraSettings& s, Visitor& v) {
   v.time({"exposure_us", "microseconds", "Exposure; 0: automatic until the session begins"},
          s.exposure,
          {0, 1'000'000});
-  v.number({"gain", "1 = none", "Gain of the sensor; 0: automatic until the session begins"},
+  v.number({"gain",
+            "1 = none",
+            "Gain of the sensor, in units of the camera where it counts otherwise; 0: automatic "
+            "until the "
+            "session begins"},
            s.gain,
            {0.0, 64.0});
   v.whole({"white_balance_k", "kelvin", "Colour temperature; 0: automatic"},
           s.white_balance_k,
           {0, 15000});
-  v.number({"focus_dioptres", "1/m", "Focus of the lens, 0 = infinity; -1: automatic"},
-           s.focus_dioptres,
-           {-1.0, 50.0});
+  v.number(
+      {"focus_dioptres",
+       "1/m",
+       "Focus of the lens, 0 = infinity, in units of the camera where it counts otherwise; -1: "
+       "automatic"},
+      s.focus_dioptres,
+      {-1.0, 50.0});
   v.truth({"lock_controls", "", "Hold exposure, gain, white balance and focus during a session"},
           s.lock_controls);
   v.text({"profile", "", "Camera profile made by trigmesh calibrate; empty: solve for the lens"},
          s.profile);
+  v.choice({"replay_speed",
+            "",
+            "Of a recording that stands for a camera; it begins anew at its end; lockstep: a frame "
+            "when the one before is done with"},
+           s.replay_speed,
+           Choices<3>{"recorded", "fastest", "lockstep"});
 }
 
 template <typename Visitor>
@@ -72,7 +86,7 @@ void visit_trigger(TriggerSettings& s, Visitor& v) {
   v.truth({"active_low", "", "The button connects the line to ground"}, s.active_low);
   v.time({"debounce_ms", "ms", "Edges that come sooner after the last are bounces"},
          s.debounce,
-         {0, 200});
+         {0, 100});
   v.time({"long_press_ms", "ms", "From this length on a press is long: it finishes the session"},
          s.long_press,
          {300, 10'000});
@@ -156,6 +170,11 @@ void visit_reconstruction(ReconstructionSettings& s, Visitor& v) {
   v.whole({"seed", "", "Of random numbers: the same input and seed give the same model"},
           s.seed,
           {0, std::numeric_limits<int>::max()});
+  v.time({"stall_limit_s",
+          "s",
+          "The service starts anew when the work on a model does not get on for this time"},
+         s.stall_limit,
+         {30, 86'400});
 }
 
 template <typename Visitor>

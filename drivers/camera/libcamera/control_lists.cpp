@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 
@@ -92,7 +93,9 @@ std::optional<ControlRange> range_of(const libcamera::ControlInfoMap& camera, Co
                       .minimum = to_our_unit(id, low),
                       .maximum = to_our_unit(id, upper),
                       .step = 1,
-                      .standard = to_our_unit(id, std::clamp(standard, low, upper))};
+                      .standard = to_our_unit(id, std::clamp(standard, low, upper)),
+                      // White balance is a gain here, which no colour temperature tells.
+                      .per_unit = id == ControlId::kWhiteBalance ? 0 : std::llround(unit_of(id))};
 }
 
 void write_control(libcamera::ControlList& request, ControlValue control, float blue_gain) {

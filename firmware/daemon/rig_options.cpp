@@ -1,0 +1,109 @@
+#include "firmware/daemon/rig_options.hpp"
+
+#include <algorithm>
+
+namespace trigmesh {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::nanoseconds;
+
+constexpr std::uint64_t kBytesPerMb = 1'000'000;
+/// An edge is heard of when the contact is at rest; threads and the camera's driver are late, too.
+constexpr milliseconds kLateness(100);
+constexpr std::size_t kMostHistory = 32;
+
+std::uint64_t bytes_of_mb(int megabytes) {
+  return static_cast<std::uint64_t>(megabytes) * kBytesPerMb;
+}
+
+std::vector<WantedControl> wanted_controls(const CameraSettings& camera) {
+  std::vector<WantedControl> wanted;
+  if (camera.exposure.count() > 0) {
+    wanted.push_back({ControlId::kExposure, static_cast<double>(camera.exposure.count())});
+  }
+  if (camera.gain > 0.0) {
+    wanted.push_back({ControlId::kGain, camera.gain});
+  }
+  if (camera.white_balance_k > 0) {
+    wanted.push_back({ControlId::kWhiteBalance, static_cast<double>(camera.white_balance_k)});
+  }
+  if (camera.focus_dioptres >= 0.0) {
+    wanted.push_back({ControlId::kFocus, camera.focus_dioptres});
+  }
+  return wanted;
+}
+
+RigLoopOptions rig_options(const Settings& settings) {
+  const CaptureSettings& capture = settings.capture;
+  RigLoopOptions options;
+  options.rig.mode =
+      capture.mode == CaptureSettings::Mode::kStill ? CaptureMode::kStill : CaptureMode::kVideo;
+  options.rig.video_trigger = capture.video_trigger == CaptureSettings::VideoTrigger::kHold
+                                  ? VideoTrigger::kHold
+                                  : VideoTrigger::kToggle;
+  options.rig.makes_models = settings.reconstruction.enabled;
+  options.presses.long_press = settings.trigger.long_press;
+  options.presses.double_press = settings.trigger.double_press;
+  options.edge_delay = settings.trigger.debounce + milliseconds(20);
+  return options;
+}
+
+CaptureOptions capture_options(const Settings& settings) {
+  CaptureOptions options;
+  options.frame_interval = nanoseconds(std::chrono::seconds(1)) / settings.camera.rate_hz;
+  options.stills.wait = settings.capture.still_wait;
+  options.stills.history = 0;
+  if (settings.capture.mode == CaptureSettings::Mode::kStill) {
+    const auto late =
+        static_cast<std::size_t>((settings.trigger.debounce + kLateness) / options.frame_interval);
+    options.stills.history = std::clamp<std::size_t>(late + 3, 4, kMostHistory);
+  }
+  options.group_size = static_cast<std::size_t>(settings.capture.every_nth_sharp_frame);
+  options.hold = {wanted_controls(settings.camera), settings.camera.lock_controls};
+  options.silence = std::max<nanoseconds>(std::chrono::seconds(2), 10 * options.frame_interval);
+  return options;
+}
+
+StorageOptions storage_options(const Settings& settings,
+                               const std::string& profile,
+                               const std::string& software_version) {
+  const StorageSettings& storage = settings.storage;
+  StorageOptions options;
+  options.store.store.root = storage.root;
+  options.store.store.limits = {
+      bytes_of_mb(storage.quota_mb), bytes_of_mb(storage.reserve_mb), bytes_of_mb(storage.warn_mb)};
+  options.store.store.retention = {storage.remove_old == StorageSettings::Removal::kWhenNeeded
+                                       ? RetentionRules::Removal::kWhenNeeded
+                                       : RetentionRules::Removal::kNever,
+                                   storage.remove_without_model,
+                                   storage.remove_not_exported};
+  options.store.store.software_version = software_version;
+  NewSession& session = options.store.session;
+  session.mode = settings.capture.mode == CaptureSettings::Mode::kStill ? "still" : "video";
+  session.camera_profile = profile;
+  session.settings = render_settings(settings);
+  session.seed = static_cast<std::uint64_t>(settings.reconstruction.seed);
+  options.store.jpeg_quality = settings.capture.jpeg_quality;
+  return options;
+}
+
+}  // namespace
+
+DaemonOptions options_of_settings(const Settings& settings,
+                                  const std::string& profile,
+                                  const std::string& software_version) {
+  DaemonOptions options;
+  options.rig = rig_options(settings);
+  options.capture = capture_options(settings);
+  options.storage = storage_options(settings, profile, software_version);
+  options.stream_queue_frames = static_cast<std::size_t>(settings.capture.queue_frames);
+  // What the shelf holds, what waits, the best of a group and its successor, one being stored.
+  options.copies = options.capture.stills.history + options.stream_queue_frames + 4;
+  options.command_patience = settings.capture.still_wait + milliseconds(30'000);
+  options.repeat_interval = settings.log.repeat_interval;
+  options.software_version = software_version;
+  return options;
+}
+
+}  // namespace trigmesh

@@ -1,0 +1,358 @@
+#include "firmware/daemon/storage.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include <fmt/format.h>
+
+namespace trigmesh {
+namespace {
+
+/// How long the thread waits for an order before it shows that it lives.
+constexpr std::chrono::milliseconds kTurn(500);
+
+/// A disk that is full is well.
+bool is_about_disk(const Error& error) {
+  return error.code == ErrorCode::kIo || error.code == ErrorCode::kNotFound;
+}
+
+}  // namespace
+
+void Storage::run() {
+  while (!parts_.inbox.is_finished()) {
+    parts_.heartbeat.beat();
+    look_after_disk();
+    if (auto order =
+            parts_.inbox.pop(std::min<std::chrono::nanoseconds>(kTurn, options_.check_interval))) {
+      std::visit([this](auto& one) { do_order(std::move(one)); }, *order);
+    }
+  }
+  if (store_.has_session()) {  // it was not closed in order: the next start does it
+    store_.drop_session();
+  }
+}
+
+void Storage::look_after_disk() {
+  const std::chrono::nanoseconds now = parts_.clock.now();
+  if (last_check_ && now - *last_check_ < options_.check_interval) {
+    return;
+  }
+  last_check_ = now;
+  if (!store_.is_open()) {
+    open_store();
+  }
+  check_level();
+}
+
+void Storage::open_store() {
+  if (!model_id_.empty()) {
+    return;  // it still uses what is open; it was asked to stop
+  }
+  const auto found = store_.open();
+  if (!found) {
+    disk_failed(found.error());
+    return;
+  }
+  parts_.faults.clear("storage");
+  tell_found(*found);
+}
+
+void Storage::tell_found(const FrameStore::Found& found) {
+  for (const StoreRecovery::Recovered& recovered : found.recovery.recovered) {
+    const SessionRecovery& details = recovered.details;
+    write_log(details.damaged() ? LogLevel::kError : LogLevel::kWarn,
+              "a session was not closed in order and is put right",
+              {{"session", recovered.id},
+               {"torn_bytes", std::to_string(details.torn_bytes)},
+               {"removed_files", std::to_string(details.removed_files)},
+               {"damages", std::to_string(details.damages.size())},
+               {"missing_frames", std::to_string(details.missing.size())}});
+  }
+  for (const StoreRecovery::Unreadable& unreadable : found.recovery.unreadable) {
+    write_log(
+        LogLevel::kError,
+        fmt::format("a session cannot be read and is left alone: {}", unreadable.error.message),
+        {{"session", unreadable.name}});
+  }
+  for (const std::string& id : found.failed) {
+    write_log(LogLevel::kError,
+              "the model of a session ended the program too often and is not tried again",
+              {{"session", id}});
+  }
+  for (const std::string& id : found.removed) {
+    write_log(LogLevel::kInfo, "a session without frames is removed", {{"session", id}});
+  }
+  (void)parts_.rig.push(ModelsWaiting{found.for_models});
+}
+
+void Storage::report(StorageLevel level, std::uint64_t available_bytes) {
+  if (!told_ || told_->level != level || told_->available_bytes != available_bytes) {
+    told_ = StorageReport{level, available_bytes};
+    (void)parts_.rig.push(*told_);
+  }
+}
+
+void Storage::check_level() {
+  if (!store_.is_open()) {
+    return;
+  }
+  const auto level = store_.level();
+  if (!level) {
+    disk_failed(level.error());
+    return;
+  }
+  if (level->level == StorageLevel::kFull) {
+    parts_.faults.report("storage",
+                         "no space is left for frames: export and remove sessions, or change "
+                         "quota_mb and reserve_mb");
+  } else {
+    parts_.faults.clear("storage");
+  }
+  report(level->level, level->available_bytes);
+}
+
+void Storage::disk_failed(const Error& error) {
+  parts_.faults.report("storage",
+                       fmt::format("{}; sessions cannot be kept until it can be written: look at "
+                                   "the disk, its mount and the rights of the folder",
+                                   error.message));
+  if (store_.has_session()) {
+    (void)parts_.rig.push(SessionLost{serial_, error});
+  }
+  store_.give_up();
+  parts_.models.request_stop();
+  report(StorageLevel::kFull, 0);
+}
+
+void Storage::do_order(OpenSessionOrder order) {
+  serial_ = order.serial;
+  if (!store_.is_open()) {
+    open_store();  // perhaps it is back
+  }
+  if (!store_.is_open()) {
+    (void)parts_.rig.push(
+        SessionLost{order.serial, Error{ErrorCode::kIo, parts_.faults.text_of("storage")}});
+    return;
+  }
+  drops_at_begin_ = parts_.drops.now();
+  const Result<std::string> id = store_.begin_session();
+  if (!id) {
+    (void)parts_.rig.push(SessionLost{order.serial, id.error()});
+    if (is_about_disk(id.error())) {
+      disk_failed(id.error());
+    } else {
+      check_level();
+    }
+    return;
+  }
+  write_log(LogLevel::kInfo, "session begins", {{"session", *id}});
+  (void)parts_.rig.push(SessionOpened{order.serial, *id});
+}
+
+void Storage::do_order(RecordOrder order) {
+  if (!is_current(order.serial)) {
+    return;
+  }
+  if (const auto recorded = store_.session().record(std::move(order.entry)); !recorded) {
+    parts_.faults.report("journal", recorded.error().message);
+    if (store_.session().is_broken()) {
+      disk_failed(recorded.error());
+    }
+  } else {
+    parts_.faults.clear("journal");
+  }
+}
+
+Result<std::uint32_t> Storage::store_frame(const TimedFrame& timed) {
+  Result<std::uint32_t> number = store_.add_frame(timed);
+  if (number) {
+    write_log(LogLevel::kDebug,
+              "frame is stored",
+              {{"session", store_.session().manifest().id}, {"frame", std::to_string(*number)}});
+    return number;
+  }
+  refuse(timed, number.error());
+  return number;
+}
+
+void Storage::refuse(const TimedFrame& timed, const Error& error) {
+  FrameRefused refused;
+  refused.reason = FrameRefusal::kNotStored;
+  if (error.code == ErrorCode::kNoSpace) {
+    refused.reason = FrameRefusal::kNoSpace;
+  } else if (error.code == ErrorCode::kCorruptData) {
+    refused.reason = FrameRefusal::kCorrupt;
+  }
+  refused.sensor_sequence = timed.sequence;
+  (void)store_.session().record(refused);  // where the disk is gone, so is its record
+  write_log(LogLevel::kError,
+            fmt::format("a frame is not stored: {}", error.message),
+            {{"session", store_.session().manifest().id}});
+}
+
+void Storage::do_order(StreamFrameOrder order) {
+  if (!is_current(order.serial)) {
+    return;
+  }
+  const Result<std::uint32_t> number = store_frame(order.frame);
+  if (number) {
+    (void)parts_.rig.push(StreamFrameStored{order.serial, *number});
+    check_level();
+  } else if (is_about_disk(number.error())) {
+    disk_failed(number.error());
+  } else {
+    check_level();
+  }
+}
+
+void Storage::do_order(StillFrameOrder order) {
+  if (!is_current(order.serial)) {
+    return;
+  }
+  Result<std::uint32_t> number = store_frame(order.frame);
+  const bool is_disk_gone = !number && is_about_disk(number.error());
+  const Error error = number ? Error{} : number.error();
+  (void)parts_.rig.push(StillAnswered{order.serial, order.ticket, std::move(number)});
+  if (is_disk_gone) {
+    disk_failed(error);
+  } else {
+    check_level();
+  }
+}
+
+void Storage::do_order(StreamDoneOrder order) {
+  if (!is_current(order.serial)) {
+    return;
+  }
+  do_order(RecordOrder{order.serial, Note{std::move(order.note)}});
+  (void)parts_.rig.push(StreamDrained{order.serial});
+}
+
+void Storage::do_order(UndoOrder order) {
+  if (!is_current(order.serial)) {
+    return;
+  }
+  Result<std::uint32_t> number = store_.session().undo_last_frame();
+  const bool is_broken = store_.session().is_broken();
+  const Error error = number ? Error{} : number.error();
+  (void)parts_.rig.push(UndoAnswered{order.serial, std::move(number)});
+  if (is_broken) {
+    disk_failed(error);
+  }
+}
+
+void Storage::do_order(CloseOrder order) {
+  if (!is_current(order.serial)) {
+    return;
+  }
+  const std::string id = store_.session().manifest().id;
+  const bool keeps = order.end == SessionEnd::kKeep;
+  const auto done =
+      keeps ? store_.close_session(order.why, drops_of_session()) : store_.discard_session();
+  if (done) {
+    write_log(LogLevel::kInfo,
+              keeps ? "session is closed" : "session without frames is removed",
+              {{"session", id}});
+    check_level();
+    return;
+  }
+  // What was acknowledged is safe; the next opening of the store closes it.
+  store_.drop_session();
+  disk_failed(done.error());
+}
+
+DropCounts Storage::drops_of_session() const {
+  const DropCounts now = parts_.drops.now();
+  return {now.sensor - drops_at_begin_.sensor,
+          now.queue - drops_at_begin_.queue,
+          now.corrupt - drops_at_begin_.corrupt};
+}
+
+void Storage::do_order(BeginModelOrder order) {
+  if (!store_.is_open()) {
+    open_store();
+  }
+  Result<Session> session = store_.is_open()
+                                ? store_.open_for_model(order.id)
+                                : fail(ErrorCode::kIo, "{}", parts_.faults.text_of("storage"));
+  if (!session) {
+    (void)parts_.rig.push(ModelAnswer{order.id, ModelOutcome::kFailed, session.error().message});
+    return;
+  }
+  write_log(LogLevel::kInfo, "model is begun", {{"session", order.id}});
+  model_id_ = order.id;
+  parts_.models.begin(*std::move(session));
+}
+
+void Storage::do_order(StopModelOrder /*order*/) {
+  parts_.models.request_stop();
+}
+
+void Storage::do_order(ModelEndedOrder order) {
+  model_id_.clear();
+  if (order.end != ModelEnd::kOver && store_.is_open()) {
+    if (const auto noted = store_.model_stopped(order.id, order.end); !noted) {
+      write_log(LogLevel::kWarn, noted.error().message, {{"session", order.id}});
+    }
+  }
+  check_level();  // models take space, too
+}
+
+void Storage::do_order(ListOrder order) {
+  order.answer(store_.is_open() ? store_.store().list()
+                                : fail(ErrorCode::kIo, "{}", parts_.faults.text_of("storage")));
+}
+
+Result<> Storage::check_unused(const std::string& id) {
+  if (!store_.is_open()) {
+    return fail(ErrorCode::kIo, "{}", parts_.faults.text_of("storage"));
+  }
+  const char* use = nullptr;
+  if (store_.has_session() && store_.session().manifest().id == id) {
+    use = "it is open: finish it first";
+  } else if (id == model_id_) {
+    use = "its model is being made: wait, or cancel it";
+  } else if (id == export_id_) {
+    use = "it is being exported: wait";
+  }
+  return use == nullptr
+             ? Result<>()
+             : fail(ErrorCode::kInsufficientData, "cannot use session {} now: {}", id, use);
+}
+
+void Storage::do_order(RemoveOrder order) {
+  Result<> removed =
+      check_unused(order.id).and_then([&] { return store_.store().remove(order.id); });
+  if (removed) {
+    write_log(LogLevel::kInfo, "session is removed", {{"session", order.id}});
+  }
+  order.answer(std::move(removed));
+  check_level();
+}
+
+void Storage::do_order(BeginExportOrder order) {
+  if (!export_id_.empty()) {
+    order.answer(fail(ErrorCode::kInsufficientData,
+                      "cannot export session {}: {} is being exported; wait",
+                      order.id,
+                      export_id_));
+    return;
+  }
+  if (const auto unused = check_unused(order.id); !unused) {
+    order.answer(tl::unexpected<Error>(unused.error()));
+    return;
+  }
+  export_id_ = order.id;
+  order.answer(store_.store().folder_of(order.id));
+}
+
+void Storage::do_order(EndExportOrder order) {
+  export_id_.clear();
+  if (order.end == ExportEnd::kFailed || !store_.is_open()) {
+    order.answer({});
+    return;
+  }
+  order.answer(store_.mark_exported(order.id));
+}
+
+}  // namespace trigmesh
