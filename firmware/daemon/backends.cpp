@@ -16,6 +16,7 @@
 #include "drivers/trigger/gpiod/gpio_trigger.hpp"
 #include "firmware/base/check.hpp"
 #include "firmware/daemon/auto_source.hpp"
+#include "firmware/daemon/model_worker.hpp"
 #include "firmware/daemon/restamped_source.hpp"
 #ifdef TRIGMESH_WITH_LIBCAMERA
 #include "drivers/camera/libcamera/camera_hub.hpp"
@@ -182,24 +183,19 @@ IndicatorOpener make_light(const IndicatorSettings& indicator) {
   };
 }
 
-/// Makes no models: sessions stay as they are.
-class NoModels final : public ModelMaker {
- public:
-  explicit NoModels(ModelObserver observer) : observer_(std::move(observer)) {}
-
-  void begin(Session session) override {
-    const std::string id = session.manifest().id;
-    { const Session closed = std::move(session); }
-    observer_.on_answer({id, ModelOutcome::kFailed, "this program makes no models"});
-  }
-
-  void request_stop() override {}
-
-  [[nodiscard]] std::uint64_t progress_count() const override { return 0; }
-
- private:
-  ModelObserver observer_;
-};
+std::unique_ptr<ModelMaker> make_model_worker(const Settings& settings,
+                                              const Clock& clock,
+                                              ModelObserver observer) {
+  auto on_progress = [tell = std::move(observer.on_progress)](const std::string& session_id,
+                                                              const Progress& progress) {
+    tell({session_id, std::string(to_string(progress.stage)), progress.done, progress.total});
+  };
+  return std::make_unique<ModelWorker>(
+      model_worker_options(settings.reconstruction, TRIGMESH_VERSION),
+      clock,
+      std::move(observer.on_answer),
+      std::move(on_progress));
+}
 
 std::vector<DeviceInfo> gpio_chips() {
   std::vector<DeviceInfo> chips;
@@ -222,8 +218,8 @@ Result<DaemonDevices> make_devices(const Settings& settings, const Clock& clock)
   TM_ASSIGN_OR_RETURN(devices.camera, make_camera(settings, clock));
   TM_ASSIGN_OR_RETURN(devices.trigger, make_trigger(settings, clock));
   devices.open_light = make_light(settings.indicator);
-  devices.make_models = [](ModelObserver observer) {
-    return std::make_unique<NoModels>(std::move(observer));
+  devices.make_models = [settings, &clock](ModelObserver observer) {
+    return make_model_worker(settings, clock, std::move(observer));
   };
   devices.list_devices = list_devices;
   return devices;

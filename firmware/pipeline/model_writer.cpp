@@ -84,26 +84,30 @@ Result<> link_tree(const std::filesystem::path& from, const std::filesystem::pat
 
 }  // namespace
 
-Result<> extend_model(const std::filesystem::path& output,
+Result<> ModelFolder::publish() {
+  return replace_directory(staged(), model());
+}
+
+Result<> extend_model(ModelPlace& place,
                       std::span<const NamedFile> files,
                       std::span<const Scene> components,
                       const ReconstructionReport& report,
                       const ReportAttachments& attachments) {
-  const StagedFolder staged(output / ".model.part");
+  const StagedFolder staged(place.staged());
   TM_RETURN_IF_ERROR(make_directory(staged.path()));
-  TM_RETURN_IF_ERROR(link_tree(output / "model", staged.path()));
+  TM_RETURN_IF_ERROR(link_tree(place.model(), staged.path()));
   // Files are replaced by rename, so the linked ones of the old model keep their bytes.
   for (const NamedFile& file : files) {
     TM_RETURN_IF_ERROR(write_file_atomically(staged.path() / file.name, file.bytes));
   }
   TM_RETURN_IF_ERROR(write_reports(staged.path(), components, report, attachments));
-  return replace_directory(staged.path(), output / "model");
+  return place.publish();
 }
 
-Result<> write_model(const std::filesystem::path& output,
+Result<> write_model(ModelPlace& place,
                      std::span<const Scene> components,
                      const ReconstructionReport& report) {
-  const StagedFolder staged(output / ".model.part");
+  const StagedFolder staged(place.staged());
   TM_RETURN_IF_ERROR(make_directory(staged.path()));
   for (std::size_t i = 0; i < components.size(); ++i) {
     const std::filesystem::path folder = component_folder(staged.path(), i);
@@ -111,14 +115,14 @@ Result<> write_model(const std::filesystem::path& output,
     TM_RETURN_IF_ERROR(write_component(components[i], folder));
   }
   TM_RETURN_IF_ERROR(write_reports(staged.path(), components, report, {}));
-  return replace_directory(staged.path(), output / "model");
+  return place.publish();
 }
 
 std::filesystem::path component_folder(const std::filesystem::path& model, std::size_t index) {
   return index == 0 ? model : model / fmt::format("component_{}", index + 1);
 }
 
-Result<> write_timings(const std::filesystem::path& output, std::span<const StageTime> times) {
+Result<> write_timings(const std::filesystem::path& file, std::span<const StageTime> times) {
   nlohmann::ordered_json json;
   const auto add = [&json](
                        const char* kind, std::string_view stage, std::chrono::nanoseconds time) {
@@ -133,7 +137,7 @@ Result<> write_timings(const std::filesystem::path& output, std::span<const Stag
   }
   add("seconds", "total", total.duration);
   add("cpu_seconds", "total", total.cpu_time);
-  return write_file_atomically(output / "timings.json", json.dump(2) + "\n");
+  return write_file_atomically(file, json.dump(2) + "\n");
 }
 
 }  // namespace trigmesh

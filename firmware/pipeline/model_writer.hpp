@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "firmware/base/result.hpp"
+#include "firmware/pipeline/model_place.hpp"
 #include "firmware/pipeline/reconstruction.hpp"
 #include "firmware/pipeline/report.hpp"
 #include "firmware/pipeline/report_html.hpp"
@@ -13,18 +14,18 @@
 
 namespace trigmesh {
 
-/// Writes `output`/model in one step: sparse/ (COLMAP text), projections.txt and sparse.ply of the
+/// Publishes a new model at its place: sparse/ (COLMAP text), projections.txt and sparse.ply of the
 /// main model, for each further model component_N/ with the same files, report.json and
 /// report.html. Before the step an older model stays as it is. Without any model only the reports
 /// are written. kIo, kNoSpace.
-[[nodiscard]] Result<> write_model(const std::filesystem::path& output,
+[[nodiscard]] Result<> write_model(ModelPlace& place,
                                    std::span<const Scene> components,
                                    const ReconstructionReport& report);
 
-/// Adds files to `output`/model, or replaces those of the same name, and renews the reports, in one
-/// step: a reader sees the model as it was or with all of them. What else is in the folder stays.
-/// kIo, kNoSpace.
-[[nodiscard]] Result<> extend_model(const std::filesystem::path& output,
+/// Adds files to the model at its place, or replaces those of the same name, and renews the
+/// reports, in one step: a reader sees the model as it was or with all of them. What else is in the
+/// folder stays. kIo, kNoSpace.
+[[nodiscard]] Result<> extend_model(ModelPlace& place,
                                     std::span<const NamedFile> files,
                                     std::span<const Scene> components,
                                     const ReconstructionReport& report,
@@ -34,9 +35,9 @@ namespace trigmesh {
 [[nodiscard]] std::filesystem::path component_folder(const std::filesystem::path& model,
                                                      std::size_t index);
 
-/// Writes `output`/timings.json: seconds and processor seconds per stage. Clock times live here and
+/// Writes a file of JSON: seconds and processor seconds per stage. Clock times live here and
 /// nowhere else.
-[[nodiscard]] Result<> write_timings(const std::filesystem::path& output,
+[[nodiscard]] Result<> write_timings(const std::filesystem::path& file,
                                      std::span<const StageTime> times);
 
 }  // namespace trigmesh

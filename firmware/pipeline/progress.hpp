@@ -39,6 +39,10 @@ class ProgressListener {
   virtual ~ProgressListener() = default;
 
   virtual void on_progress(const Progress& progress) = 0;
+
+  /// A piece of work was finished, small or large, many a second: a sign that work gets on also in
+  /// a stage that cannot count its pieces.
+  virtual void on_work() {}
 };
 
 }  // namespace trigmesh

@@ -205,8 +205,112 @@ Result<> ReconstructionOptions::validate() const {
   return {};
 }
 
+namespace {
+
+/// What is needed from the first stage to the last.
+struct Run {
+  const PhotoSet& photos;
+  const ReconstructionPlaces& places;
+  const ReconstructionOptions& options;
+  const CheckpointFolder& checkpoints;
+  ProgressListener& listener;
+  const std::stop_token& stop;
+  Stopwatch& stopwatch;
+};
+
+/// Features of all photographs, and which of them share intrinsics.
+struct PhotoFeatures {
+  std::vector<ExtractedImage> images;
+  CameraGroups cameras;
+};
+
+Result<PhotoFeatures> extract(const Run& run, const MemoryPlan& plan) {
+  WorkerPool pool(plan.extraction_threads, run.stop, &run.listener);
+  const StageContext context{pool, run.checkpoints, run.listener, run.stop};
+  TM_ASSIGN_OR_RETURN(auto images,
+                      extract_photos(run.photos, run.options.feature_kind, plan.features, context));
+  TM_RETURN_IF_ERROR(check_readable(run.photos, images));
+  refuse_duplicates(run.photos, images);
+  TM_ASSIGN_OR_RETURN(CameraGroups cameras,
+                      run.options.poses ? groups_of_model(run.photos, images, *run.options.poses)
+                                        : group_cameras(grouping_images(run.photos, images),
+                                                        run.options.cameras,
+                                                        run.options.grouping));
+  run.stopwatch.finish(Stage::kExtract);
+  return PhotoFeatures{std::move(images), std::move(cameras)};
+}
+
+Result<MappedPhotos> map_features(const Run& run,
+                                  const PhotoFeatures& features,
+                                  const std::vector<PairRecord>& pairs,
+                                  const StageContext& context) {
+  const auto& [images, cameras] = features;
+  MapperOptions mapper = run.options.mapper;
+  mapper.seed = run.options.seed;
+  auto mapped = run.options.poses
+                    ? map_known_poses(
+                          run.photos, images, cameras, pairs, {*run.options.poses, mapper}, context)
+                    : map_photos(run.photos, images, cameras, pairs, mapper, context);
+  run.stopwatch.finish(Stage::kMap);
+  return mapped;
+}
+
+Result<ReconstructionSummary> run_stages(const Run& run) {
+  const ReconstructionOptions& options = run.options;
+  TM_ASSIGN_OR_RETURN(const MemoryPlan plan, plan_for(run.photos, options));
+  WorkerPool pool(options.num_threads, run.stop, &run.listener);
+  const StageContext context{pool, run.checkpoints, run.listener, run.stop};
+  TM_ASSIGN_OR_RETURN(const PhotoFeatures features, extract(run, plan));
+  TM_ASSIGN_OR_RETURN(const auto pairs,
+                      match_photos(features.images,
+                                   features.cameras,
+                                   {options.pair_mode, run.photos.ordered, options.seed},
+                                   context));
+  run.stopwatch.finish(Stage::kMatch);
+  TM_ASSIGN_OR_RETURN(const MappedPhotos mapped, map_features(run, features, pairs, context));
+
+  run.listener.on_progress({Stage::kWrite, 0, 1});
+  ReconstructionSummary summary{
+      report_on(run.photos, options, plan, features.cameras, pairs, mapped), {}};
+  TM_RETURN_IF_ERROR(write_model(run.places.model, mapped.components, summary.report));
+  run.listener.on_progress({Stage::kWrite, 1, 1});
+  run.stopwatch.finish(Stage::kWrite);
+  if (!mapped.components.empty()) {
+    TM_RETURN_IF_ERROR(build_surface({run.photos, mapped.components, run.places.model, options},
+                                     context,
+                                     run.stopwatch,
+                                     summary.report));
+  }
+  return summary;
+}
+
+/// Writes the times and tidies up.
+Result<> finish(const Run& run, ReconstructionSummary& summary) {
+  summary.times = run.stopwatch.times();
+  if (!run.places.timings.empty()) {
+    TM_RETURN_IF_ERROR(write_timings(run.places.timings, summary.times));
+  }
+  if (is_finished(run.options.build.last_stage) &&
+      run.places.finished_work == ReconstructionPlaces::FinishedWork::kDiscard) {
+    run.checkpoints.discard();
+  }
+  return {};
+}
+
+/// Whatever stage it was in.
+template <typename Work>
+auto stoppable(const Work& work) -> decltype(work()) {
+  try {
+    return work();
+  } catch (const WorkStopped&) {
+    return fail(ErrorCode::kCancelled, "stopped; finished stages are kept");
+  }
+}
+
+}  // namespace
+
 Result<ReconstructionSummary> reconstruct(const PhotoSet& photos,
-                                          const std::filesystem::path& output,
+                                          const ReconstructionPlaces& places,
                                           const ReconstructionOptions& options,
                                           const Clock& clock,
                                           ProgressListener& listener,
@@ -215,55 +319,23 @@ Result<ReconstructionSummary> reconstruct(const PhotoSet& photos,
   if (photos.names.empty()) {
     return fail(ErrorCode::kInsufficientData, "there are no photographs to reconstruct from");
   }
-  TM_RETURN_IF_ERROR(make_directory(output));
-  TM_ASSIGN_OR_RETURN(const CheckpointFolder checkpoints, CheckpointFolder::open(output / "work"));
-  TM_ASSIGN_OR_RETURN(const MemoryPlan plan, plan_for(photos, options));
-  WorkerPool pool(options.num_threads);
-  WorkerPool extraction_pool(plan.extraction_threads);
+  TM_ASSIGN_OR_RETURN(const CheckpointFolder checkpoints, CheckpointFolder::open(places.work));
   Stopwatch stopwatch(clock);
-
-  const StageContext extraction{extraction_pool, checkpoints, listener, stop};
-  TM_ASSIGN_OR_RETURN(auto images,
-                      extract_photos(photos, options.feature_kind, plan.features, extraction));
-  TM_RETURN_IF_ERROR(check_readable(photos, images));
-  refuse_duplicates(photos, images);
-  TM_ASSIGN_OR_RETURN(
-      const CameraGroups cameras,
-      options.poses
-          ? groups_of_model(photos, images, *options.poses)
-          : group_cameras(grouping_images(photos, images), options.cameras, options.grouping));
-  stopwatch.finish(Stage::kExtract);
-
-  const StageContext context{pool, checkpoints, listener, stop};
-  TM_ASSIGN_OR_RETURN(
-      const auto pairs,
-      match_photos(images, cameras, {options.pair_mode, photos.ordered, options.seed}, context));
-  stopwatch.finish(Stage::kMatch);
-
-  MapperOptions mapper = options.mapper;
-  mapper.seed = options.seed;
-  TM_ASSIGN_OR_RETURN(
-      const MappedPhotos mapped,
-      options.poses
-          ? map_known_poses(photos, images, cameras, pairs, {*options.poses, mapper}, context)
-          : map_photos(photos, images, cameras, pairs, mapper, context));
-  stopwatch.finish(Stage::kMap);
-
-  listener.on_progress({Stage::kWrite, 0, 1});
-  ReconstructionSummary summary{report_on(photos, options, plan, cameras, pairs, mapped), {}};
-  TM_RETURN_IF_ERROR(write_model(output, mapped.components, summary.report));
-  listener.on_progress({Stage::kWrite, 1, 1});
-  stopwatch.finish(Stage::kWrite);
-  if (!mapped.components.empty()) {
-    const BuildInput input{photos, mapped.components, output, options};
-    TM_RETURN_IF_ERROR(build_surface(input, context, stopwatch, summary.report));
-  }
-  summary.times = stopwatch.times();
-  TM_RETURN_IF_ERROR(write_timings(output, summary.times));
-  if (is_finished(options.build.last_stage)) {
-    checkpoints.discard();
-  }
+  const Run run{photos, places, options, checkpoints, listener, stop, stopwatch};
+  TM_ASSIGN_OR_RETURN(ReconstructionSummary summary, stoppable([&] { return run_stages(run); }));
+  TM_RETURN_IF_ERROR(finish(run, summary));
   return summary;
+}
+
+Result<ReconstructionSummary> reconstruct(const PhotoSet& photos,
+                                          const std::filesystem::path& output,
+                                          const ReconstructionOptions& options,
+                                          const Clock& clock,
+                                          ProgressListener& listener,
+                                          const std::stop_token& stop) {
+  ModelFolder folder(output);
+  const ReconstructionPlaces places{folder, output / "work", output / "timings.json"};
+  return reconstruct(photos, places, options, clock, listener, stop);
 }
 
 Result<ReconstructionSummary> continue_model(const ExistingModel& model,
@@ -276,19 +348,21 @@ Result<ReconstructionSummary> continue_model(const ExistingModel& model,
   TM_RETURN_IF_ERROR(options.validate());
   TM_RETURN_IF_ERROR(make_directory(output));
   TM_ASSIGN_OR_RETURN(const CheckpointFolder checkpoints, CheckpointFolder::open(output / "work"));
-  WorkerPool pool(options.num_threads);
+  ModelFolder folder(output);
+  WorkerPool pool(options.num_threads, stop, &listener);
   Stopwatch stopwatch(clock);
   ReconstructionSummary summary{report_on_model(photos, options, model), {}};
   std::error_code error;
-  if (!std::filesystem::is_directory(output / "model", error)) {
-    TM_RETURN_IF_ERROR(write_model(output, model.components, summary.report));
+  if (!std::filesystem::is_directory(folder.model(), error)) {
+    TM_RETURN_IF_ERROR(write_model(folder, model.components, summary.report));
     stopwatch.finish(Stage::kWrite);
   }
   const StageContext context{pool, checkpoints, listener, stop};
-  TM_RETURN_IF_ERROR(build_surface(
-      {photos, model.components, output, options}, context, stopwatch, summary.report));
+  const BuildInput input{photos, model.components, folder, options};
+  TM_RETURN_IF_ERROR(
+      stoppable([&] { return build_surface(input, context, stopwatch, summary.report); }));
   summary.times = stopwatch.times();
-  TM_RETURN_IF_ERROR(write_timings(output, summary.times));
+  TM_RETURN_IF_ERROR(write_timings(output / "timings.json", summary.times));
   return summary;
 }
 

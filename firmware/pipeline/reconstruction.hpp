@@ -13,6 +13,7 @@
 #include "firmware/pipeline/build_options.hpp"
 #include "firmware/pipeline/camera_groups.hpp"
 #include "firmware/pipeline/existing_model.hpp"
+#include "firmware/pipeline/model_place.hpp"
 #include "firmware/pipeline/photo_set.hpp"
 #include "firmware/pipeline/progress.hpp"
 #include "firmware/pipeline/report.hpp"
@@ -49,15 +50,35 @@ struct ReconstructionSummary {
   std::vector<StageTime> times;
 };
 
-/// Photographs in, cameras and coloured cloud out: extracts, matches, maps, and writes
-/// `output`/model (in one step: it is either the old or the new model, never half of one),
-/// `output`/timings.json, and while it works `output`/work, from which an interrupted call with the
-/// same photographs and options goes on.
+/// Where a reconstruction leaves what it makes.
+struct ReconstructionPlaces {
+  enum class FinishedWork { kDiscard, kKeep };
+
+  ModelPlace& model;
+  std::filesystem::path
+      work;  ///< folder of finished pieces, from which an interrupted call goes on
+  std::filesystem::path timings;  ///< file of seconds per stage; empty: none
+  /// Whether the work folder stays when nothing that could still follow needs it.
+  FinishedWork finished_work = FinishedWork::kDiscard;
+};
+
+/// Photographs in, cameras and coloured cloud out: extracts, matches, maps, and publishes the model
+/// at its place, each result as soon as it exists. An interrupted call with the same photographs
+/// and options goes on from the work folder. A stop request is looked at by every stage, many times
+/// a second.
 ///
 /// Errors: kInvalidArgument (options), kInsufficientData (no photograph, none readable), kCancelled
 /// (stop requested; finished work is kept), kIo and kNoSpace (the output cannot be written;
 /// likewise), kLimitExceeded (the memory limit is below what the smallest settings need). Finding
 /// no model is not an error: the report tells why for each image.
+[[nodiscard]] Result<ReconstructionSummary> reconstruct(const PhotoSet& photos,
+                                                        const ReconstructionPlaces& places,
+                                                        const ReconstructionOptions& options,
+                                                        const Clock& clock,
+                                                        ProgressListener& listener,
+                                                        const std::stop_token& stop);
+
+/// The same into `output`/model, `output`/work and `output`/timings.json.
 [[nodiscard]] Result<ReconstructionSummary> reconstruct(const PhotoSet& photos,
                                                         const std::filesystem::path& output,
                                                         const ReconstructionOptions& options,

@@ -60,7 +60,7 @@ Result<> check_not_stopped(const StageContext& context, const char* what) {
 
 Result<> publish(const Work& work, const std::vector<NamedFile>& files) {
   return extend_model(
-      work.input.output,
+      work.input.place,
       files,
       work.input.components,
       work.report,
@@ -80,7 +80,7 @@ std::optional<DenseCloud> stored_cloud(const Work& work, const DepthMaps& depth)
   if (!told) {
     return std::nullopt;
   }
-  const auto ply = read_file(work.input.output / "model" / "dense.ply", kMaxCloudBytes);
+  const auto ply = read_file(work.input.place.model() / "dense.ply", kMaxCloudBytes);
   if (!ply || seal_of(*ply) != *told) {
     return std::nullopt;
   }

@@ -1,5 +1,7 @@
 #include "firmware/pipeline/worker_pool.hpp"
 
+#include <utility>
+
 #include <pthread.h>
 #include <signal.h>
 
@@ -31,11 +33,12 @@ class BlockedSignals {
 
 }  // namespace
 
-WorkerPool::WorkerPool(int num_threads) {
+WorkerPool::WorkerPool(int num_threads, std::stop_token stop, ProgressListener* listener)
+    : stop_(std::move(stop)), listener_(listener) {
   TM_CHECK(num_threads >= 1);
   const BlockedSignals blocked;
   for (int i = 1; i < num_threads; ++i) {
-    threads_.emplace_back([this](const std::stop_token& stop) { serve(stop); });
+    threads_.emplace_back([this](const std::stop_token& end) { serve(end); });
     pthread_setname_np(threads_.back().native_handle(), "tm-worker");
   }
 }
@@ -59,6 +62,19 @@ void WorkerPool::for_each_index(std::size_t count, const std::function<void(std:
   std::unique_lock lock(mutex_);
   job_changed_.wait(lock, [this] { return busy_count_ == 0; });
   work_ = nullptr;
+  lock.unlock();
+  if (next_.load(std::memory_order_relaxed) < count) {
+    throw WorkStopped{};
+  }
+  if (listener_ != nullptr) {
+    listener_->on_work();
+  }
+}
+
+void WorkerPool::stop_point() {
+  if (stop_.stop_requested()) {
+    throw WorkStopped{};
+  }
 }
 
 void WorkerPool::serve(const std::stop_token& stop) {
@@ -76,7 +92,11 @@ void WorkerPool::serve(const std::stop_token& stop) {
 }
 
 void WorkerPool::drain() {
-  for (std::size_t i = next_.fetch_add(1); i < count_; i = next_.fetch_add(1)) {
+  while (!stop_.stop_requested()) {
+    const std::size_t i = next_.fetch_add(1);
+    if (i >= count_) {
+      return;
+    }
     (*work_)(i);
   }
 }

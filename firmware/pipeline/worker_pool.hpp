@@ -5,21 +5,26 @@
 #include <cstddef>
 #include <functional>
 #include <mutex>
+#include <stop_token>
 #include <thread>
 #include <vector>
 
 #include "firmware/base/executor.hpp"
+#include "firmware/pipeline/progress.hpp"
 
 namespace trigmesh {
 
 /// Runs the indices of one job at a time on a fixed number of named threads; the calling thread is
 /// one of them. Indices are handed out in ascending order, so a job whose early indices matter most
 /// gets them first. Single owner: `for_each_index` is called from one thread at a time and not from
-/// within its own work.
+/// within its own work. A stop request ends a job before its next index, by WorkStopped.
 class WorkerPool final : public Executor {
  public:
-  /// `num_threads` >= 1, including the caller's.
-  explicit WorkerPool(int num_threads);
+  /// `num_threads` >= 1, including the caller's. `listener`, which may be null and outlives the
+  /// pool, is told of every finished job.
+  explicit WorkerPool(int num_threads,
+                      std::stop_token stop = {},
+                      ProgressListener* listener = nullptr);
   ~WorkerPool() override;
   WorkerPool(const WorkerPool&) = delete;
   WorkerPool& operator=(const WorkerPool&) = delete;
@@ -28,10 +33,14 @@ class WorkerPool final : public Executor {
 
   void for_each_index(std::size_t count, const std::function<void(std::size_t)>& work) override;
 
+  void stop_point() override;
+
  private:
   void serve(const std::stop_token& stop);
   void drain();
 
+  const std::stop_token stop_;
+  ProgressListener* const listener_;
   std::mutex mutex_;
   std::condition_variable_any job_changed_;
   const std::function<void(std::size_t)>* work_ =

@@ -8,12 +8,13 @@
 namespace trigmesh {
 
 // Names in the folder of a session. Hidden names (a dot in front) are work in progress; after a
-// crash they are removed.
+// crash they are removed, except the finished pieces of a model that is still to be made.
 inline constexpr std::string_view kManifestName = "session.json";
 inline constexpr std::string_view kJournalName = "journal";
 inline constexpr std::string_view kFramesName = "frames";
 inline constexpr std::string_view kFrameTableName = "frames.csv";
 inline constexpr std::string_view kModelName = "model";
+inline constexpr std::string_view kWorkName = ".work";
 
 // Names in the folder of all sessions: one that is being made, and one that is being removed.
 inline constexpr std::string_view kNewPrefix = ".new-";

@@ -55,6 +55,18 @@ fs::path Session::staged_model() const {
   return folder_ / fmt::format(".{}.part", kModelName);
 }
 
+fs::path Session::model() const {
+  return folder_ / kModelName;
+}
+
+fs::path Session::work_folder() const {
+  return folder_ / kWorkName;
+}
+
+Result<> Session::discard_work() {
+  return remove_tree(*context_.files, work_folder());
+}
+
 Result<std::uint32_t> Session::add_frame(std::span<const std::uint8_t> jpeg,
                                          const FrameMetadata& metadata) {
   if (!accepts_frames() || jpeg.empty() || metadata.timestamp.count() < 0) {
@@ -118,6 +130,10 @@ Result<> Session::record(JournalEntry entry) {
 }
 
 Result<> Session::set_state(SessionState state, const std::string& why) {
+  if (state == SessionState::kReconstructing) {
+    // Also the sign for the next start that the journal may know more than a settled manifest.
+    TM_RETURN_IF_ERROR(make_directory(*context_.files, work_folder(), Durability::kSynced));
+  }
   return state == SessionState::kClosed ? close(why) : change_state(state, why);
 }
 
@@ -152,11 +168,11 @@ Result<> Session::publish_model() {
   TM_RETURN_IF_ERROR(sync_tree(*context_.files, staged));
   TM_ASSIGN_OR_RETURN(const std::uint64_t size_bytes, tree_size_bytes(*context_.files, staged));
   TM_ASSIGN_OR_RETURN(const std::uint64_t replaced_bytes,
-                      tree_size_bytes(*context_.files, folder_ / kModelName));
-  TM_RETURN_IF_ERROR(replace_directory(*context_.files, staged, folder_ / kModelName));
+                      tree_size_bytes(*context_.files, model()));
+  TM_RETURN_IF_ERROR(replace_directory(*context_.files, staged, model()));
   context_.budget->add(size_bytes);
   context_.budget->remove(replaced_bytes);
-  return change_state(SessionState::kModelReady, "the model is in place");
+  return {};
 }
 
 Result<> Session::mark_exported() {

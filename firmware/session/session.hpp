@@ -44,8 +44,11 @@ struct SessionRecovery {
 ///     session.record(EdgeRecord{..});
 ///     TM_ASSIGN_OR_RETURN(auto number, session.add_frame(jpeg, metadata));
 ///     session.close("long press");
-///     // make a model in session.staged_model()
-///     session.publish_model();
+///     session.set_state(SessionState::kReconstructing, "..");
+///     // put a model together in session.staged_model()
+///     session.publish_model();  // again for each part that is added
+///     session.set_state(SessionState::kModelReady, "..");
+///     session.discard_work();
 ///
 /// Thread-compatible.
 class Session {
@@ -73,7 +76,8 @@ class Session {
   /// functions of their own (kInvalidArgument). kNoSpace, kIo.
   [[nodiscard]] Result<> record(JournalEntry entry);
 
-  /// A later state, with the reason for people. Closing is close()'s. kNoSpace, kIo.
+  /// A later state, with the reason for people. kReconstructing makes the work folder, kClosed is
+  /// close(). kNoSpace, kIo.
   [[nodiscard]] Result<> set_state(SessionState state, const std::string& why);
 
   /// No more frames; writes the frame table. Again: no failure. kNoSpace, kIo.
@@ -82,9 +86,20 @@ class Session {
   /// Where a model is put together, in sight of nobody.
   [[nodiscard]] std::filesystem::path staged_model() const;
 
+  /// Where the published model is; missing before the first publish_model().
+  [[nodiscard]] std::filesystem::path model() const;
+
   /// Puts what is in staged_model() in the place of model/ in one step, after an fsync of all of
-  /// it, and sets kModelReady. kNotFound when nothing is staged, kNoSpace, kIo.
+  /// it. The state is set_state()'s: a model whose session was left kReconstructing may be half
+  /// done, and is made again. kNotFound when nothing is staged, kNoSpace, kIo.
   [[nodiscard]] Result<> publish_model();
+
+  /// Where finished pieces of the model are kept while it is made, hidden from exports. It stays
+  /// over a restart until the session has its model, or it is certain that it will have none.
+  [[nodiscard]] std::filesystem::path work_folder() const;
+
+  /// Removes the work folder; no failure when there is none. kIo.
+  [[nodiscard]] Result<> discard_work();
 
   [[nodiscard]] Result<> mark_exported();
 

@@ -21,6 +21,10 @@ Result<std::vector<FolderEntry>> entries_of(FileSystem& files, const fs::path& f
   return *std::move(entries);
 }
 
+bool still_gets_model(SessionState state) {
+  return state == SessionState::kClosed || state == SessionState::kReconstructing;
+}
+
 }  // namespace
 
 Result<Session::Opened> Session::open(const SessionContext& context, const fs::path& folder) {
@@ -67,7 +71,8 @@ Result<> SessionOpener::remove_leftovers() {
   TM_RETURN_IF_ERROR(finish_replacement(*context_.files, folder_ / kModelName));
   TM_ASSIGN_OR_RETURN(const std::vector<FolderEntry> entries, entries_of(*context_.files, folder_));
   for (const FolderEntry& entry : entries) {
-    if (is_hidden_name(entry.name)) {
+    const bool is_needed = entry.name == kWorkName && still_gets_model(state_);
+    if (is_hidden_name(entry.name) && !is_needed) {
       TM_RETURN_IF_ERROR(remove_tree(*context_.files, folder_ / entry.name));
       ++recovery_.removed_files;
     }
@@ -107,12 +112,11 @@ Result<> SessionOpener::match_frame_files() {
 
 Result<> SessionOpener::settle_state(Session& session) {
   recovery_.was_open = state_ == SessionState::kCapturing;
-  const bool has_model = context_.files->status(folder_ / kModelName).has_value();
   SessionState settled = state_;
   if (recovery_.was_open) {
     settled = SessionState::kInterrupted;
   } else if (state_ == SessionState::kReconstructing) {
-    settled = has_model ? SessionState::kModelReady : SessionState::kClosed;
+    settled = SessionState::kClosed;  // the model may lack parts; what is finished is found again
   }
   // The table first: a manifest of a settled state promises that it is there.
   const fs::path table = folder_ / kFrameTableName;

@@ -32,9 +32,11 @@ bool is_settled(SessionState state) {
          state == SessionState::kModelFailed;
 }
 
-bool has_hidden(const std::vector<FolderEntry>& entries) {
-  return std::any_of(entries.begin(), entries.end(), [](const FolderEntry& entry) {
-    return is_hidden_name(entry.name) || entry.name.ends_with(".old");
+/// Whether something was left half done. Pieces of a model that is still to be made are none.
+bool has_leftovers(const std::vector<FolderEntry>& entries, SessionState state) {
+  return std::any_of(entries.begin(), entries.end(), [state](const FolderEntry& entry) {
+    const bool is_needed = entry.name == kWorkName && state == SessionState::kClosed;
+    return (is_hidden_name(entry.name) && !is_needed) || entry.name.ends_with(".old");
   });
 }
 
@@ -85,7 +87,7 @@ Result<> SessionStore::recover_session(const std::string& id) {
   const fs::path folder = folder_of(id);
   TM_ASSIGN_OR_RETURN(const SessionManifest manifest, read_manifest(*files_, folder));
   TM_ASSIGN_OR_RETURN(const std::vector<FolderEntry> entries, entries_of(*files_, folder));
-  if (is_settled(manifest.state) && !has_hidden(entries)) {
+  if (is_settled(manifest.state) && !has_leftovers(entries, manifest.state)) {
     return {};  // closed in order: nothing to read
   }
   TM_ASSIGN_OR_RETURN(Session::Opened opened, Session::open(context(), folder));

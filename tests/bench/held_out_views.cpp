@@ -14,6 +14,7 @@
 #include <opencv2/core.hpp>
 
 #include "firmware/base/check.hpp"
+#include "firmware/photos/photo_input.hpp"
 #include "firmware/pipeline/photo_images.hpp"
 #include "firmware/pipeline/surface_plan.hpp"
 #include "firmware/pipeline/worker_pool.hpp"
@@ -25,7 +26,6 @@
 #include "sfm/texture/image_similarity.hpp"
 #include "sfm/texture/texture_surface.hpp"
 #include "sfm/texture/textured_render.hpp"
-#include "tools/trigmesh/photo_input.hpp"
 
 namespace trigmesh {
 namespace {

@@ -70,7 +70,8 @@ std::vector<std::size_t> points_of_script(FaultKind kind) {
   FaultyFileSystem files;
   test_support::run_session_script(files, scene.root, scene.promises);
   EXPECT_EQ(scene.promises.all("kept").size(), 12U);
-  EXPECT_EQ(scene.promises.all("model").size(), 2U);
+  EXPECT_EQ(scene.promises.all("model").size(), 4U);
+  EXPECT_EQ(scene.promises.all("ready").size(), 2U);
   if (kind == FaultKind::kTornWriteKill || kind == FaultKind::kShortThenFail ||
       kind == FaultKind::kShortWrite) {
     return files.write_calls();
@@ -80,12 +81,15 @@ std::vector<std::size_t> points_of_script(FaultKind kind) {
   return calls;
 }
 
-bool has_hidden_files(const fs::path& root) {
+/// Finished pieces of a model that is still to be made are none.
+bool has_leftovers(const fs::path& root) {
   return std::any_of(fs::recursive_directory_iterator(root),
                      fs::recursive_directory_iterator(),
                      [](const fs::directory_entry& entry) {
                        const std::string name = entry.path().filename().string();
-                       return name.starts_with('.') || name.ends_with(".old");
+                       const bool is_work =
+                           entry.path().string().find("/.work") != std::string::npos;
+                       return !is_work && (name.starts_with('.') || name.ends_with(".old"));
                      });
 }
 
@@ -131,6 +135,19 @@ void expect_whole_model(const fs::path& session, const Promises& promises) {
   EXPECT_GE(*versions.begin(), std::to_string(promised.empty() ? 1 : promised.back()));
 }
 
+/// The state that was promised last, and pieces of a model only where it is still to be made.
+void expect_model_goes_on(const Session& session, const Promises& promises) {
+  const SessionState state = session.manifest().state;
+  EXPECT_NE(state, SessionState::kReconstructing) << "nobody makes it";
+  if (promises.all("ready").size() == 2) {
+    EXPECT_EQ(state, SessionState::kModelReady);
+  }
+  if (state == SessionState::kModelReady) {
+    EXPECT_FALSE(fs::exists(session.work_folder()));
+    EXPECT_TRUE(fs::exists(session.model()));
+  }
+}
+
 /// Starts the program again, as after a crash, and looks at everything. The time that it took.
 std::chrono::nanoseconds expect_nothing_lost(const Scene& scene) {
   FaultyFileSystem files;
@@ -142,7 +159,7 @@ std::chrono::nanoseconds expect_nothing_lost(const Scene& scene) {
   const auto duration = std::chrono::steady_clock::now() - begin;
   EXPECT_TRUE(store) << store.error().message;
   EXPECT_TRUE(store->recovery().unreadable.empty());
-  EXPECT_FALSE(has_hidden_files(scene.root));
+  EXPECT_FALSE(has_leftovers(scene.root));
   const auto sessions = store->list().value();
   EXPECT_TRUE(!sessions.empty() || scene.promises.all("kept").empty());
   EXPECT_LE(sessions.size(), 1U);
@@ -156,6 +173,7 @@ std::chrono::nanoseconds expect_nothing_lost(const Scene& scene) {
     EXPECT_EQ(opened->session.manifest().state, info.manifest.state);
     expect_frames_kept(opened->session, scene.promises);
     expect_whole_model(opened->session.folder(), scene.promises);
+    expect_model_goes_on(opened->session, scene.promises);
     EXPECT_EQ(read_file(opened->session.folder() / "frames.csv", 10'000).value_or("missing"),
               render_frame_table(opened->session.frames()));
   }

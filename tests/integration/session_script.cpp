@@ -81,11 +81,20 @@ void make_model(FileSystem& files,
   if (!session.set_state(SessionState::kReconstructing, "test")) {
     repair(store, session);
   }
-  if (!write_model_files(files, session, version)) {
-    return;
+  (void)write_file_atomically(files, session.work_folder() / "piece", "done", Durability::kCache);
+  // First a part of it, then all; readers tell by the version.
+  for (const std::uint32_t published : {2 * version - 1, 2 * version}) {
+    if (!write_model_files(files, session, published)) {
+      return;
+    }
+    if (session.publish_model()) {
+      promises.add("model", published);
+    }
+    repair(store, session);
   }
-  if (session.publish_model()) {
-    promises.add("model", version);
+  if (session.set_state(SessionState::kModelReady, "test")) {
+    promises.add("ready", version);
+    (void)session.discard_work();
   }
   repair(store, session);
 }

@@ -9,11 +9,11 @@
 #include <fmt/format.h>
 
 #include "firmware/base/check.hpp"
+#include "firmware/photos/photo_input.hpp"
 #include "firmware/pipeline/existing_model.hpp"
 #include "firmware/pipeline/reconstruction.hpp"
 #include "tools/trigmesh/command.hpp"
 #include "tools/trigmesh/interrupt.hpp"
-#include "tools/trigmesh/photo_input.hpp"
 #include "tools/trigmesh/progress_printer.hpp"
 #include "tools/trigmesh/surface_arguments.hpp"
 

@@ -27,12 +27,13 @@ class OpenExistingModel : public ::testing::Test {
     ReportInput input;
     input.components = scenes_;
     input.images = images;
-    ASSERT_TRUE(write_model(output_, scenes_, build_report(input)));
+    ASSERT_TRUE(write_model(place_, scenes_, build_report(input)));
   }
 
   std::vector<Scene> scenes_;
   const test_support::TemporaryFolder folder_;
   const std::filesystem::path output_ = folder_.path();
+  ModelFolder place_{output_};
 };
 
 TEST_F(OpenExistingModel, BringsAllPartsAndWhatWasRefused) {
@@ -57,7 +58,7 @@ TEST_F(OpenExistingModel, WarnsWhenTheReportIsDamagedOrOfAnotherModel) {
   elsewhere[0].name = "elsewhere.jpg";
   ReportInput input;
   input.images = elsewhere;
-  ASSERT_TRUE(write_model(output_, scenes_, build_report(input)));
+  ASSERT_TRUE(write_model(place_, scenes_, build_report(input)));
   const auto foreign = open_existing_model(output_);
   ASSERT_TRUE(foreign);
   EXPECT_THAT(foreign->warning, HasSubstr("does not know the image"));

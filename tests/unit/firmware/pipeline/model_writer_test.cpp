@@ -23,16 +23,17 @@ class ExtendModel : public testing::Test {
  protected:
   const test_support::TemporaryFolder temporary_;
   const fs::path output_ = temporary_.path();
+  ModelFolder place_{output_};
 };
 
 TEST_F(ExtendModel, KeepsWhatIsThereAndAddsOrReplaces) {
   const ReconstructionReport report = build_report({});
-  ASSERT_TRUE(write_model(output_, std::vector<Scene>(1), report));
+  ASSERT_TRUE(write_model(place_, std::vector<Scene>(1), report));
   const std::string images = contents(output_ / "model/sparse/images.txt");
   const std::vector<NamedFile> first{{"dense.ply", "points"}, {"mesh.ply", "old"}};
-  ASSERT_TRUE(extend_model(output_, first, {}, report));
+  ASSERT_TRUE(extend_model(place_, first, {}, report));
   const std::vector<NamedFile> second{{"mesh.ply", "new"}};
-  ASSERT_TRUE(extend_model(output_, second, {}, report));
+  ASSERT_TRUE(extend_model(place_, second, {}, report));
   EXPECT_EQ(contents(output_ / "model/sparse/images.txt"), images);
   EXPECT_EQ(contents(output_ / "model/dense.ply"), "points");
   EXPECT_EQ(contents(output_ / "model/mesh.ply"), "new");
@@ -40,7 +41,7 @@ TEST_F(ExtendModel, KeepsWhatIsThereAndAddsOrReplaces) {
 }
 
 TEST_F(ExtendModel, NeedsAModel) {
-  const auto result = extend_model(output_, {}, {}, build_report({}));
+  const auto result = extend_model(place_, {}, {}, build_report({}));
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().code, ErrorCode::kIo);
   EXPECT_FALSE(fs::exists(output_ / ".model.part"));

@@ -2,6 +2,8 @@
 
 #include <atomic>
 #include <numeric>
+#include <stop_token>
+#include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -35,6 +37,50 @@ TEST_P(WorkerPoolThreads, DoesNothingForNoWork) {
 }
 
 INSTANTIATE_TEST_SUITE_P(OneToEight, WorkerPoolThreads, ::testing::Values(1, 2, 3, 8));
+
+TEST_P(WorkerPoolThreads, EndsAJobBeforeItsNextIndexWhenAskedToStop) {
+  std::stop_source stop;
+  WorkerPool pool(GetParam(), stop.get_token());
+  pool.stop_point();
+  std::atomic<int> calls = 0;
+  const auto work = [&](std::size_t i) {
+    ++calls;
+    if (i == 0) {
+      stop.request_stop();
+    }
+    while (!stop.stop_requested()) {  // the others begin no second index
+      std::this_thread::yield();
+    }
+  };
+  EXPECT_THROW(pool.for_each_index(1000, work), WorkStopped);
+  EXPECT_LE(calls, GetParam());
+  EXPECT_THROW(pool.for_each_index(1, work), WorkStopped);
+  EXPECT_THROW(pool.stop_point(), WorkStopped);
+}
+
+TEST_P(WorkerPoolThreads, GivesAJobThatWasCompleteWhenTheStopCame) {
+  std::stop_source stop;
+  WorkerPool pool(GetParam(), stop.get_token());
+  pool.for_each_index(1, [&](std::size_t) { stop.request_stop(); });
+}
+
+class CountingListener final : public ProgressListener {
+ public:
+  void on_progress(const Progress& /*progress*/) override {}
+
+  void on_work() override { ++finished; }
+
+  int finished = 0;
+};
+
+TEST_P(WorkerPoolThreads, TellsOfEveryFinishedJob) {
+  CountingListener listener;
+  WorkerPool pool(GetParam(), {}, &listener);
+  for (int job = 0; job < 10; ++job) {
+    pool.for_each_index(5, [](std::size_t) {});
+  }
+  EXPECT_EQ(listener.finished, 10);
+}
 
 TEST(WorkerPool, EndsWithoutEverHavingWorked) {
   const WorkerPool pool(4);

@@ -71,6 +71,7 @@ class Store : public ::testing::Test {
     EXPECT_TRUE(make_directory(session.staged_model() / "sparse"));
     EXPECT_TRUE(write_file_atomically(session.staged_model() / "sparse" / "images.txt", "model"));
     EXPECT_TRUE(session.publish_model());
+    EXPECT_TRUE(session.set_state(SessionState::kModelReady, "test"));
     return session.manifest().id;
   }
 
@@ -94,6 +95,28 @@ TEST_F(Store, KeepsFramesAndSaysWhatIsThere) {
   EXPECT_EQ(sessions[0].manifest.frame_count, 2U);
   EXPECT_FALSE(sessions[0].has_model);
   EXPECT_GT(sessions[0].size_bytes, 200U);
+}
+
+TEST_F(Store, KeepsThePiecesOfAModelUntilItIsDone) {
+  const auto piece = [](const Session& session) { return session.work_folder() / "piece"; };
+  std::string id;
+  {
+    SessionStore store = open();
+    Session session = create(store);
+    add_frames(session, 2);
+    id = session.manifest().id;
+    ASSERT_TRUE(session.close("test"));
+    ASSERT_TRUE(session.set_state(SessionState::kReconstructing, "test"));
+    ASSERT_TRUE(write_file_atomically(piece(session), "done"));
+    ASSERT_TRUE(make_directory(session.staged_model()));
+    ASSERT_TRUE(session.publish_model());
+  }
+  SessionStore store = open();
+  Session session = store.open_session(id).value().session;
+  EXPECT_EQ(session.manifest().state, SessionState::kClosed) << "the model may lack parts";
+  EXPECT_TRUE(std::filesystem::exists(piece(session)));
+  ASSERT_TRUE(session.set_state(SessionState::kModelFailed, "test"));
+  EXPECT_FALSE(std::filesystem::exists(piece(store.open_session(id).value().session)));
 }
 
 TEST_F(Store, ASessionIsARecording) {

@@ -1,4 +1,4 @@
-#include "tools/trigmesh/photo_input.hpp"
+#include "firmware/photos/photo_input.hpp"
 
 #include <algorithm>
 #include <filesystem>

@@ -1,0 +1,261 @@
+#include "firmware/daemon/model_worker.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <system_error>
+#include <utility>
+
+#include <pthread.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <fmt/format.h>
+
+#include "firmware/base/check.hpp"
+#include "firmware/daemon/session_model_place.hpp"
+#include "firmware/photos/photo_input.hpp"
+#include "sfm/exchange/camera_profile.hpp"
+
+namespace trigmesh {
+namespace {
+
+constexpr std::uint64_t kMegabyte = 1'000'000;
+
+QualityPreset preset_of(ReconstructionSettings::Preset preset) {
+  switch (preset) {
+    case ReconstructionSettings::Preset::kPreview:
+      return QualityPreset::kPreview;
+    case ReconstructionSettings::Preset::kStandard:
+      return QualityPreset::kStandard;
+    case ReconstructionSettings::Preset::kFine:
+      break;
+  }
+  return QualityPreset::kFine;
+}
+
+int thread_count(int wanted) {
+  constexpr int kMostThreads = 256;
+  if (wanted > 0) {
+    return wanted;
+  }
+  return std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, kMostThreads);
+}
+
+/// The calling thread, and those that it will start.
+void lower_priority(int nice) {
+  pthread_setname_np(pthread_self(), "tm-model");
+  // Linux keeps the niceness per thread. Raising it is always allowed.
+  (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), nice);
+}
+
+/// What is known of the camera before the first picture.
+Result<std::vector<Camera>> cameras_of(const SessionManifest& manifest) {
+  if (manifest.camera_profile.empty()) {
+    return std::vector<Camera>();
+  }
+  TM_ASSIGN_OR_RETURN(
+      const CameraProfile profile,
+      parse_camera_profile(manifest.camera_profile,
+                           fmt::format("camera profile of session {}", manifest.id)));
+  return std::vector{profile.camera};
+}
+
+std::string times_sentence(const std::vector<StageTime>& times) {
+  std::string sentence = "model made:";
+  for (const StageTime& time : times) {
+    sentence += fmt::format(" {} {:.1f} s",
+                            to_string(time.stage),
+                            std::chrono::duration<double>(time.duration).count());
+  }
+  return sentence;
+}
+
+ModelOutcome outcome_of(const Error& error) {
+  switch (error.code) {
+    case ErrorCode::kCancelled:
+      return ModelOutcome::kCancelled;
+    case ErrorCode::kInsufficientData:
+      return ModelOutcome::kNone;
+    default:
+      return ModelOutcome::kFailed;
+  }
+}
+
+/// How a finished or failed reconstruction is told. `has_model`: whether the sparse model is in
+/// place.
+ModelAnswer answer_of(const SessionManifest& manifest,
+                      const Result<ReconstructionSummary>& made,
+                      bool has_model) {
+  ModelAnswer answer{manifest.id, ModelOutcome::kReady, {}};
+  if (made) {
+    answer.outcome = made->report.components.empty() ? ModelOutcome::kNone : ModelOutcome::kReady;
+    answer.message = made->report.verdict_sentence;
+    return answer;
+  }
+  answer.outcome = outcome_of(made.error());
+  answer.message = made.error().message;
+  if (answer.outcome == ModelOutcome::kNone && has_model) {
+    answer.outcome = ModelOutcome::kReady;
+    answer.message = "the model has no surface: " + made.error().message;
+  }
+  return answer;
+}
+
+SessionState state_of(ModelOutcome outcome, SessionState before) {
+  switch (outcome) {
+    case ModelOutcome::kReady:
+      return SessionState::kModelReady;
+    case ModelOutcome::kCancelled:
+      return before;
+    case ModelOutcome::kNone:
+    case ModelOutcome::kFailed:
+      break;
+  }
+  return SessionState::kModelFailed;
+}
+
+/// Makes the outcome durable. What cannot be written makes it a failure.
+void settle(Session& session, SessionState before, ModelAnswer& answer) {
+  const SessionState state = state_of(answer.outcome, before);
+  if (const Result<> written = session.set_state(state, answer.message); !written) {
+    answer.outcome = ModelOutcome::kFailed;
+    answer.message = written.error().message;
+    return;
+  }
+  if (answer.outcome != ModelOutcome::kCancelled) {
+    (void)session.discard_work();  // else the next opening removes it
+  }
+}
+
+}  // namespace
+
+Result<> ModelWorkerOptions::validate() const {
+  constexpr int kNicest = 19;
+  TM_RETURN_IF_ERROR(reconstruction.validate());
+  if (nice < 0 || nice > kNicest) {
+    return fail(ErrorCode::kInvalidArgument, "nice is {}: it must be in [0, {}]", nice, kNicest);
+  }
+  return {};
+}
+
+ModelWorkerOptions model_worker_options(const ReconstructionSettings& settings,
+                                        const std::string& software_version) {
+  ModelWorkerOptions options;
+  options.nice = settings.priority;
+  ReconstructionOptions& reconstruction = options.reconstruction;
+  reconstruction.build.preset = preset_of(settings.preset);
+  reconstruction.num_threads = thread_count(settings.threads);
+  reconstruction.memory_limit_bytes =
+      kMegabyte * static_cast<std::uint64_t>(settings.memory_limit_mb);
+  reconstruction.seed = static_cast<std::uint64_t>(settings.seed);
+  reconstruction.software_version = software_version;
+  return options;
+}
+
+/// Counts and passes on.
+class ModelWorker::Listener final : public ProgressListener {
+ public:
+  Listener(ModelWorker& worker, std::string session_id)
+      : worker_(worker), session_id_(std::move(session_id)) {}
+
+  void on_progress(const Progress& progress) override {
+    ++worker_.progress_count_;
+    if (worker_.on_progress_) {
+      worker_.on_progress_(session_id_, progress);
+    }
+  }
+
+  void on_work() override { ++worker_.progress_count_; }
+
+ private:
+  ModelWorker& worker_;
+  const std::string session_id_;
+};
+
+ModelWorker::ModelWorker(ModelWorkerOptions options,
+                         const Clock& clock,
+                         OnAnswer on_answer,
+                         OnProgress on_progress)
+    : options_(std::move(options)),
+      clock_(clock),
+      on_answer_(std::move(on_answer)),
+      on_progress_(std::move(on_progress)),
+      thread_([this](const std::stop_token& end) { serve(end); }) {
+  TM_CHECK(options_.validate().has_value());
+}
+
+ModelWorker::~ModelWorker() {
+  thread_.request_stop();
+  request_stop();
+}
+
+void ModelWorker::begin(Session session) {
+  {
+    const std::lock_guard lock(mutex_);
+    TM_CHECK(!job_.has_value());
+    job_ = std::move(session);
+    job_stop_ = std::stop_source();
+  }
+  job_came_.notify_all();
+}
+
+void ModelWorker::request_stop() {
+  const std::lock_guard lock(mutex_);
+  job_stop_.request_stop();
+}
+
+void ModelWorker::serve(const std::stop_token& end) {
+  sigset_t all;
+  sigfillset(&all);
+  pthread_sigmask(SIG_SETMASK, &all, nullptr);
+  lower_priority(options_.nice);
+  std::unique_lock lock(mutex_);
+  while (job_came_.wait(lock, end, [this] { return job_.has_value(); })) {
+    Session session = *std::exchange(job_, std::nullopt);
+    const std::stop_token stop = job_stop_.get_token();
+    lock.unlock();
+    const ModelAnswer answer = make_model(std::move(session), stop);
+    on_answer_(answer);
+    lock.lock();
+  }
+}
+
+ModelAnswer ModelWorker::make_model(Session session, const std::stop_token& stop) {
+  const SessionState before = session.manifest().state;
+  if (const Result<> begun =
+          session.set_state(SessionState::kReconstructing, "the model is being made");
+      !begun) {
+    return {session.manifest().id, ModelOutcome::kFailed, begun.error().message};
+  }
+  const Result<ReconstructionSummary> made = reconstruct_session(session, stop);
+  std::error_code error;
+  const bool has_model = std::filesystem::exists(session.model() / "sparse", error);
+  ModelAnswer answer = answer_of(session.manifest(), made, has_model);
+  if (made) {
+    (void)session.record(Note{times_sentence(made->times)});  // only for people
+  }
+  settle(session, before, answer);
+  return answer;
+}
+
+Result<ReconstructionSummary> ModelWorker::reconstruct_session(Session& session,
+                                                               const std::stop_token& stop) {
+  ReconstructionOptions options = options_.reconstruction;
+  TM_ASSIGN_OR_RETURN(options.cameras, cameras_of(session.manifest()));
+  TM_ASSIGN_OR_RETURN(const PhotoSet photos,
+                      open_photos(session.folder().string(), Subfolders::kIgnore, MaskUse::kUse));
+  SessionModelPlace place(session);
+  Listener listener(*this, session.manifest().id);
+  return reconstruct(photos,
+                     {place,
+                      session.work_folder(),
+                      /*timings=*/{},
+                      ReconstructionPlaces::FinishedWork::kKeep},
+                     options,
+                     clock_,
+                     listener,
+                     stop);
+}
+
+}  // namespace trigmesh
