@@ -340,7 +340,7 @@ ScanResult scan_for(const DescriptorRows& a,
   return out;
 }
 
-#if HWY_TARGET == HWY_AVX3_DL
+#if HWY_TARGET <= HWY_AVX3_DL
 using DotProduct = DotProduct32;
 #else
 using DotProduct = DotProduct16;

@@ -19,9 +19,9 @@
 
 #include "sfm/matching/match_kernel.hpp"
 
-#if HWY_TARGET == HWY_AVX3_DL
+#if HWY_TARGET == HWY_AVX3_DL && HWY_MAJOR == 1 && HWY_MINOR == 0
 // Highway 1.0.3 names AVX-VNNI here, but its run-time check for this target is for AVX512-VNNI,
-// which is what we use.
+// which is what we use. Later ones name the right one.
 #undef HWY_TARGET_STR
 #define HWY_TARGET_STR \
   HWY_TARGET_STR_AVX3  \
@@ -49,13 +49,14 @@ using V32 = hn::Vec<D32>;
 
 /// Bytes below 128: the sum of two products in each 16-bit lane, at most 2 * 127^2.
 HWY_INLINE V16 multiply_bytes(V8 database, V8 query) {
-#if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX3_DL
+// The better a target, the less its number.
+#if HWY_TARGET <= HWY_AVX3
   return V16{_mm512_maddubs_epi16(database.raw, query.raw)};
 #elif HWY_TARGET == HWY_AVX2
   return V16{_mm256_maddubs_epi16(database.raw, query.raw)};
 #elif HWY_TARGET == HWY_SSE4 || HWY_TARGET == HWY_SSSE3
   return V16{_mm_maddubs_epi16(database.raw, query.raw)};
-#elif HWY_TARGET == HWY_NEON && HWY_ARCH_ARM_A64
+#elif HWY_ARCH_ARM_A64 && HWY_TARGET != HWY_EMU128
   const uint16x8_t low = vmull_u8(vget_low_u8(database.raw), vget_low_u8(query.raw));
   const uint16x8_t high = vmull_high_u8(database.raw, query.raw);
   return V16(vreinterpretq_s16_u16(vpaddq_u16(low, high)));
@@ -161,7 +162,7 @@ struct DotProduct16 {
   }
 };
 
-#if HWY_TARGET == HWY_AVX3_DL
+#if HWY_TARGET <= HWY_AVX3_DL
 /// Dot products of bytes 0..127 in 32-bit lanes, exact.
 struct DotProduct32 {
   using D = D32;
