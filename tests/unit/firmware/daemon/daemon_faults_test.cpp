@@ -26,6 +26,14 @@ class DaemonFaults : public test_support::RigUnderTest {
     ASSERT_TRUE(control().start());
     await("frame", "\"frames\":2}");
   }
+
+  /// Others may be late for a moment on a loaded machine.
+  void await_trouble(RigWatch& watch, const std::string& thread) {
+    await_that([&] {
+      const auto trouble = watch.trouble(clock_.now());
+      return trouble && trouble->find(thread) != std::string::npos;
+    });
+  }
 };
 
 TEST_F(DaemonFaults, AStreamGoesOnWhenTheCameraIsPluggedInAgain) {
@@ -49,6 +57,7 @@ TEST_F(DaemonFaults, AFullDiskClosesTheSessionAndRefusesPresses) {
   await("storage", "full");
   await("phase", "fault");
   EXPECT_EQ(control().start().error().code, ErrorCode::kNoSpace);
+  await_that([&] { return status().session_id.empty(); });
   const auto found = sessions();
   ASSERT_EQ(found.size(), 1U);
   EXPECT_NE(found[0].manifest.state, SessionState::kCapturing);
@@ -100,16 +109,14 @@ TEST_F(DaemonFaults, AHungCameraIsNoticed) {
   RigWatch watch(*daemon_, milliseconds(700), seconds(100));
   await_that([&] { return !watch.trouble(clock_.now()); });
   camera_->is_hanging = true;
-  await_that([&] { return watch.trouble(clock_.now()).has_value(); });
-  EXPECT_THAT(*watch.trouble(clock_.now()), HasSubstr("camera"));
+  await_trouble(watch, "camera");
 }
 
 TEST_F(DaemonFaults, AHungDiskIsNoticed) {
   begin_stream();
   RigWatch watch(*daemon_, milliseconds(700), seconds(100));
   disk_.set_stuck(true);
-  await_that([&] { return watch.trouble(clock_.now()).has_value(); });
-  EXPECT_THAT(*watch.trouble(clock_.now()), HasSubstr("storage"));
+  await_trouble(watch, "storage");
 }
 
 TEST_F(DaemonFaults, AModelThatDoesNotGetOnIsNoticed) {
@@ -151,9 +158,12 @@ TEST_F(DaemonEnd, WhileAModelIsMadeKeepsItForTheNextStart) {
   ASSERT_TRUE(control().finish());
   await("phase", "working");
   end_daemon();
-  start_daemon();
-  await_that([&] { return models_.begun().size() == 2; });
-  EXPECT_EQ(models_.begun()[0], models_.begun()[1]);
+  for (std::size_t i = 2; i <= 6; ++i) {  // as often as one likes
+    start_daemon();
+    await_that([&] { return models_.begun().size() == i; });
+    EXPECT_EQ(models_.begun()[0], models_.begun()[i - 1]);
+    end_daemon();
+  }
 }
 
 TEST_F(DaemonEnd, WithoutACamera) {
@@ -207,17 +217,18 @@ TEST_F(DaemonRestart, ModelsAreMadeFromTheOldestSessionOn) {
 }
 
 TEST_F(DaemonRestart, AModelThatEndedTheProgramThreeTimesIsNotTriedAgain) {
-  const std::string id = leave_session({SessionState::kClosed,
-                                        SessionState::kReconstructing,
-                                        SessionState::kReconstructing,
-                                        SessionState::kReconstructing});
+  const std::string id = leave_session({SessionState::kClosed});
+  for (std::size_t i = 1; i <= 3; ++i) {
+    start_daemon();
+    await_that([&] { return models_.begun().size() == i; });
+    drop_daemon();
+  }
   start_daemon();
-  await("camera", "true");
   await_that([&] {
     const auto found = sessions();
     return found.size() == 1 && found[0].manifest.state == SessionState::kModelFailed;
   });
-  EXPECT_THAT(models_.begun(), IsEmpty());
+  EXPECT_THAT(models_.begun(), ElementsAre(id, id, id));
 }
 
 TEST_F(DaemonRestart, WithoutModelsSessionsAreOnlyKept) {

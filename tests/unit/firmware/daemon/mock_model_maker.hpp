@@ -33,6 +33,12 @@ class ModelScript {
     answer({id, outcome, "as the test says"});
   }
 
+  /// The program ends at once.
+  void lose() {
+    const std::lock_guard lock(mutex_);
+    session_.reset();
+  }
+
   [[nodiscard]] std::vector<std::string> begun() const {
     const std::lock_guard lock(mutex_);
     return begun_;

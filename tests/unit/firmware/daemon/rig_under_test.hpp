@@ -36,7 +36,10 @@ class RigUnderTest : public ::testing::Test {
   void end_daemon();
 
   /// Threads are stopped, nothing is closed: as when the program is killed between two steps.
-  void drop_daemon() { daemon_.reset(); }
+  void drop_daemon() {
+    models_.lose();
+    daemon_.reset();
+  }
 
   void press_and_release();
 
