@@ -10,6 +10,7 @@ set(suites
   tsan/tests/unit/drivers/camera
   tsan/tests/unit/drivers/trigger
   tsan/tests/unit/firmware/base
+  tsan/tests/unit/firmware/daemon
   tsan/tests/unit/firmware/pipeline)
 set(content "# Written by tests/suites.cmake.\n")
 foreach(suite IN LISTS suites)

@@ -14,6 +14,7 @@ namespace {
 constexpr std::size_t kRigInputs = 1024;
 constexpr std::size_t kCaptureOrders = 256;
 constexpr std::size_t kStorageOrders = 256;
+constexpr std::chrono::milliseconds kProgressInterval(500);
 
 /// A thread with a name of at most 15 letters, which hears no signals.
 template <typename Work>
@@ -45,6 +46,7 @@ Daemon::Daemon(DaemonOptions options,
                std::function<void(std::string_view, const std::string&)> publish)
     : options_(std::move(options)),
       devices_(std::move(devices)),
+      clock_(place.clock),
       publish_(std::move(publish)),
       faults_(place.clock, options_.repeat_interval),
       heartbeats_(place.clock),
@@ -108,15 +110,25 @@ ModelObserver Daemon::observer() {
     });
     (void)rig_queue_.push(std::move(answer));
   };
-  observer.on_progress = [this](const ProgressEvent& event) {
-    status_.update([&event](ControlStatus& status) {
-      status.model_stage = event.stage;
-      status.model_done = event.done;
-      status.model_total = event.total;
-    });
-    publish_(kProgressEvent, render_progress_event(event));
-  };
+  observer.on_progress = [this](const ProgressEvent& event) { tell_progress(event); };
   return observer;
+}
+
+/// Comes many times a second, from several threads; watchers hear of it twice a second.
+void Daemon::tell_progress(const ProgressEvent& event) {
+  const std::chrono::nanoseconds now = clock_.now();
+  bool is_worth_telling = false;
+  status_.update([&](ControlStatus& status) {
+    is_worth_telling = status.model_stage != event.stage || event.done == event.total ||
+                       now - progress_told_ >= kProgressInterval;
+    progress_told_ = is_worth_telling ? now : progress_told_;
+    status.model_stage = event.stage;
+    status.model_done = event.done;
+    status.model_total = event.total;
+  });
+  if (is_worth_telling) {
+    publish_(kProgressEvent, render_progress_event(event));
+  }
 }
 
 void Daemon::start() {

@@ -89,13 +89,16 @@ class Daemon {
 
  private:
   [[nodiscard]] ModelObserver observer();
+  void tell_progress(const ProgressEvent& event);
 
   const DaemonOptions options_;
   DaemonDevices devices_;
+  const Clock& clock_;
   const std::function<void(std::string_view, const std::string&)> publish_;
   Faults faults_;
   Heartbeats heartbeats_;
   StatusBoard status_;
+  std::chrono::nanoseconds progress_told_{};  ///< guarded by the lock of status_
   FrameDrops drops_;
   RigQueue rig_queue_;
   CaptureQueue capture_queue_;

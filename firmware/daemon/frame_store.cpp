@@ -1,5 +1,6 @@
 #include "firmware/daemon/frame_store.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include <fmt/format.h>
@@ -13,14 +14,17 @@
 namespace trigmesh {
 namespace {
 
-/// How often the program ended while it made the model of this session: beginnings in a row, with
-/// nothing after them.
-int tries_at_end(const JournalScan& scan) {
+/// How often the program ended while it made the model of this session, since the work on it was
+/// stopped in order or came to an end.
+int tries_in(const JournalScan& scan) {
   int tries = 0;
   for (const JournalRecord& record : scan.records) {
-    if (const auto* change = std::get_if<StateChange>(&record.entry)) {
-      tries = change->state == SessionState::kReconstructing ? tries + 1 : 0;
+    const auto* change = std::get_if<StateChange>(&record.entry);
+    if (change == nullptr || change->state == SessionState::kReconstructing) {
+      continue;
     }
+    const bool has_ended = change->state == SessionState::kClosed && change->why == kFoundAfterEnd;
+    tries = has_ended ? tries + 1 : 0;
   }
   return tries;
 }
@@ -70,26 +74,31 @@ Result<> FrameStore::settle(const SessionInfo& info, Found& found) {
     }
     TM_RETURN_IF_ERROR(opened.session.close("the program had ended before it was closed"));
     found.for_models.push_back(id);
-  } else if (state == SessionState::kReconstructing) {
-    TM_ASSIGN_OR_RETURN(const int tries, model_tries(id));
-    if (tries >= kMostModelTries) {
-      TM_ASSIGN_OR_RETURN(Session::Opened opened, store_->open_session(id));
-      found.failed.push_back(id);
-      return opened.session.set_state(
-          SessionState::kModelFailed,
-          fmt::format("the program ended {} times while it made the model", tries));
-    }
-    found.for_models.push_back(id);
   } else if (state == SessionState::kClosed) {
-    found.for_models.push_back(id);
+    TM_ASSIGN_OR_RETURN(const bool is_hopeless, has_no_more_tries(found, id));
+    if (!is_hopeless) {
+      found.for_models.push_back(id);
+      return {};
+    }
+    found.failed.push_back(id);
+    TM_ASSIGN_OR_RETURN(Session::Opened opened, store_->open_session(id));
+    return opened.session.set_state(
+        SessionState::kModelFailed,
+        fmt::format("the program ended {} times while it made the model", kMostModelTries));
   }
   return {};
 }
 
-Result<int> FrameStore::model_tries(const std::string& id) {
+/// Only of sessions that were put right just now: the program had ended.
+Result<bool> FrameStore::has_no_more_tries(const Found& found, const std::string& id) {
+  const auto& recovered = found.recovery.recovered;
+  if (std::none_of(
+          recovered.begin(), recovered.end(), [&id](const auto& one) { return one.id == id; })) {
+    return false;
+  }
   TM_ASSIGN_OR_RETURN(const JournalScan scan,
                       read_journal(place_.files, store_->folder_of(id) / kJournalName));
-  return tries_at_end(scan);
+  return tries_in(scan) >= kMostModelTries;
 }
 
 void FrameStore::give_up() {

@@ -95,7 +95,7 @@ class FrameStore {
  private:
   [[nodiscard]] Result<> probe();
   [[nodiscard]] Result<> settle(const SessionInfo& info, Found& found);
-  [[nodiscard]] Result<int> model_tries(const std::string& id);
+  [[nodiscard]] Result<bool> has_no_more_tries(const Found& found, const std::string& id);
 
   FrameStoreOptions options_;
   StorePlace place_;

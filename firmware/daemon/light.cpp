@@ -9,7 +9,7 @@ namespace {
 using std::chrono::nanoseconds;
 
 /// How long the thread waits before it shows that it lives, and tries a light that failed again.
-constexpr std::chrono::seconds kTurn(1);
+constexpr std::chrono::milliseconds kTurn(500);
 
 }  // namespace
 

@@ -35,12 +35,6 @@ ErrorCode code_of(PressRefusal reason) {
   return reason == PressRefusal::kStorageFull ? ErrorCode::kNoSpace : ErrorCode::kInsufficientData;
 }
 
-void answer(std::function<void(Result<>)>& command, Result<> result) {
-  if (const auto given = std::exchange(command, nullptr)) {
-    given(std::move(result));
-  }
-}
-
 }  // namespace
 
 Rig::Rig(const RigLoopOptions& options, const RigParts& parts)
@@ -56,8 +50,9 @@ void Rig::run(const std::stop_token& stop) {
     presses_by_time();
     if (input) {
       std::visit([this](auto& one) { hear(one); }, *input);
-      show();
     }
+    show();
+    give_answers();
   }
   refuse_all();
 }
@@ -68,6 +63,20 @@ void Rig::refuse_all() {
     if (auto* command = std::get_if<Command>(&*input)) {
       answer(command->answer, fail(ErrorCode::kCancelled, "the program ends"));
     }
+  }
+  give_answers();
+}
+
+void Rig::answer(CommandAnswer& command, Result<> result) {
+  if (CommandAnswer given = std::exchange(command, nullptr)) {
+    answers_.emplace_back(std::move(given), std::move(result));
+  }
+}
+
+/// After the status was told: who is answered may look at it.
+void Rig::give_answers() {
+  for (auto& [command, result] : std::exchange(answers_, {})) {
+    command(std::move(result));
   }
 }
 
@@ -87,7 +96,6 @@ void Rig::presses_by_time() {
   }
   for (const Press& one : detector_.on_time(certain)) {
     press(one);
-    show();
   }
 }
 

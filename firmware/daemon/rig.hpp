@@ -9,6 +9,8 @@
 #include <stop_token>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "firmware/base/clock.hpp"
 #include "firmware/daemon/heartbeat.hpp"
@@ -93,6 +95,8 @@ class Rig {
 
   void end_session(SessionEnd end, std::string why);
   void fail_commands(const Error& error);
+  void answer(CommandAnswer& command, Result<> result);
+  void give_answers();
   void record(JournalEntry entry);
   void show();
   void tell_frame();
@@ -114,11 +118,12 @@ class Rig {
   SessionSerial serial_{};  ///< of the session that was opened last
   std::string session_id_;  ///< empty until it is open
   std::uint64_t next_ticket_ = 1;
-  std::function<void(Result<>)> asking_;  ///< of the command whose step is being done
-  bool asks_to_start_ = false;            ///< that command waits until the session is open
-  std::function<void(Result<>)> on_opened_;
-  std::map<StillTicket, std::function<void(Result<>)>> on_still_;
-  std::deque<std::function<void(Result<>)>> on_undone_;
+  CommandAnswer asking_;        ///< of the command whose step is being done
+  bool asks_to_start_ = false;  ///< that command waits until the session is open
+  CommandAnswer on_opened_;
+  std::map<StillTicket, CommandAnswer> on_still_;
+  std::deque<CommandAnswer> on_undone_;
+  std::vector<std::pair<CommandAnswer, Result<>>> answers_;  ///< to be given
 
   std::deque<std::string> waiting_models_;
   std::string model_id_;  ///< at work or paused; empty: none

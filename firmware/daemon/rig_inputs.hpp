@@ -75,11 +75,13 @@ struct ModelsWaiting {
 
 enum class CommandKind : std::uint8_t { kStart, kFinish, kStill, kUndo, kCancelModel };
 
+using CommandAnswer = std::function<void(Result<>)>;
+
 /// From outside; answered once.
 struct Command {
   CommandKind kind = CommandKind::kStart;
   std::chrono::nanoseconds time{};  ///< when it was asked for
-  std::function<void(Result<>)> answer;
+  CommandAnswer answer;
 };
 
 /// The program shall end.

@@ -87,6 +87,9 @@ enum class SessionState : std::uint8_t {
 
 [[nodiscard]] std::string_view to_string(SessionState state);
 
+/// Why the state changed of a session that was found at work: the program or the power had ended.
+inline constexpr std::string_view kFoundAfterEnd = "found after the program had ended";
+
 struct StateChange {
   SessionState state = SessionState::kCapturing;
   std::string why;  ///< for people; at most kMaxJournalTextBytes

@@ -128,7 +128,7 @@ Result<> SessionOpener::settle_state(Session& session) {
   }
   if (settled != state_) {
     session.manifest_.recoveries += recovery_.was_open ? 1 : 0;
-    return session.change_state(settled, "found after the program had ended");
+    return session.change_state(settled, std::string(kFoundAfterEnd));
   }
   if (session.manifest_.state != state_) {
     session.manifest_.state = state_;
