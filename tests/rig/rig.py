@@ -2,6 +2,7 @@
 
 import argparse
 import concurrent.futures
+import fcntl
 import hashlib
 import importlib.util
 import pathlib
@@ -123,13 +124,18 @@ def main():
     parser.add_argument("--build", type=pathlib.Path, required=True)
     parser.add_argument("--package", type=pathlib.Path, required=True)
     parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--prepare", action="store_true")
     parser.add_argument("--keep", action="store_true")
     parser.add_argument("scenarios", nargs="*")
     arguments = parser.parse_args()
     sys.path.insert(0, str(HERE))
     selected = select(arguments.scenarios)
     rig = Rig(arguments.build, arguments.package)
-    rig.prepare()
+    with open(rig.guest / ".state.lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        rig.prepare()
+    if arguments.prepare:
+        return 0
     with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
         results = list(pool.map(lambda path: run_scenario(rig, path, arguments.keep), selected))
     print(f"rig: {sum(results)} of {len(results)} scenarios succeeded", flush=True)
