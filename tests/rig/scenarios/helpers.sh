@@ -134,3 +134,30 @@ all_frames_are() {
 # The line of rig_check_store of a session
 told() { rig_check_store $store | grep "^session $(basename "$1") " ; }
 check_store() { rig_check_store $store "$@" || fail "the store is not right"; }
+
+# ---- questions for wait_until
+session_has() { [ "$(session_count)" -gt 0 ] && [ "$(frame_count "$(newest)")" -ge "$1" ]; }
+# newer_has SESSION N: there is a later session, with N frames
+newer_has() { [ "$(newest)" != "$1" ] && session_has "$2"; }
+is_closed() { case $(state_of "$1") in capturing | interrupted) return 1 ;; esac; }
+camera_is() { [ "$(status camera_present)" = "$1" ]; }
+storage_is() { [ "$(status storage)" = "$1" ]; }
+pid_is_not() { local now; now=$(main_pid); [ "$now" != "$1" ] && [ "$now" != 0 ] && systemctl is-active --quiet trigmesh.service; }
+# answered SESSION PRESSES: kept frames and missed ones make up all presses
+answered() {
+  local kept missed
+  kept=$(frame_count "$1")
+  missed=$(journalctl --quiet --no-pager --unit=trigmesh.service --grep='press .*(missed|no frame|refused)' | wc -l)
+  [ $((kept + missed)) -ge "$2" ]
+}
+
+# ---- the light, read back from the line: samples of two and a half seconds
+light_samples() {
+  local i
+  for i in $(seq 25); do
+    light
+    sleep 0.1
+  done
+}
+light_is_steady() { [ "$(light_samples | sort -u)" = 1 ]; }
+light_blinks() { [ "$(light_samples | sort -u | wc -l)" -eq 2 ]; }
