@@ -102,7 +102,6 @@ small_settings() {
   set_key storage reserve_mb 20
   set_key storage warn_mb 10
   set_key reconstruction preset '"preview"'
-  set_key log level '"debug"'
 }
 service_up() {
   systemctl reset-failed trigmesh.service 2>/dev/null || true
@@ -141,6 +140,7 @@ session_has() { [ "$(session_count)" -gt 0 ] && [ "$(frame_count "$(newest)")" -
 newer_has() { [ "$(newest)" != "$1" ] && session_has "$2"; }
 is_closed() { case $(state_of "$1") in capturing | interrupted) return 1 ;; esac; }
 camera_is() { [ "$(status camera_present)" = "$1" ]; }
+fault_tells() { status fault | grep -q "$1"; }
 storage_is() { [ "$(status storage)" = "$1" ]; }
 pid_is_not() { local now; now=$(main_pid); [ "$now" != "$1" ] && [ "$now" != 0 ] && systemctl is-active --quiet trigmesh.service; }
 # answered SESSION PRESSES: kept frames and missed ones make up all presses
