@@ -140,6 +140,20 @@ class Machine:
         status = int(self._read_answer(b"\n", 20))
         return output.decode(errors="replace"), status
 
+    def listen(self, duration_s, listener):
+        """Passes on what a command that was begun writes in that time; with 0, what it has written already."""
+        end = time.monotonic() + duration_s
+        while True:
+            self._agent.settimeout(max(0.01, end - time.monotonic()))
+            try:
+                received = self._agent.recv(65536)
+            except TimeoutError:
+                received = b""
+            if received:
+                listener(received)
+            elif time.monotonic() >= end:
+                return
+
     def run(self, command, limit_s=120):
         """Runs a line of bash in /run/rig of the guest; its output and exit status (124: over the limit)."""
         self.begin(command, limit_s)
