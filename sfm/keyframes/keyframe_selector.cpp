@@ -1,0 +1,360 @@
+#include "sfm/keyframes/keyframe_selector.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include <Eigen/Geometry>
+#include <opencv2/imgproc.hpp>
+
+#include "firmware/base/check.hpp"
+#include "sfm/keyframes/view_change.hpp"
+
+namespace trigmesh {
+namespace {
+
+/// Frames whose median says how sharp and how bright the scene is.
+constexpr std::size_t kSharpnessWindow = 31;
+constexpr std::size_t kBrightnessWindow = 5;
+/// Also where most frames are blurred, the sharp ones say what is usual.
+constexpr double kUsualShare = 0.75;
+/// Blurred frames in a row that are stepped over: corners are lost in them. Later ones are
+/// followed, for nothing better comes.
+constexpr int kMostSteppedOver = 5;
+/// Frames among which the blurriest tenth is to be avoided.
+constexpr std::size_t kSharpnessHistory = 300;
+constexpr double kBlurriestShare = 0.1;
+/// Mean difference of grey values below which two frames are the same picture: sensor noise alone
+/// is above.
+constexpr double kDuplicateDifference = 0.05;
+/// A picture with fewer corners is too dark or too blurred to go on from.
+constexpr std::size_t kFewestCorners = 16;
+
+/// The value below which `share` of the last `count` values lie.
+double quantile(const std::deque<double>& values, std::size_t count, double share) {
+  const auto first =
+      values.size() > count ? values.end() - static_cast<std::ptrdiff_t>(count) : values.begin();
+  std::vector<double> last(first, values.end());
+  const auto place =
+      last.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(last.size()));
+  std::nth_element(last.begin(), place, last.end());
+  return *place;
+}
+
+void remember(std::deque<double>& values, double value, std::size_t count) {
+  values.push_back(value);
+  if (values.size() > count) {
+    values.pop_front();
+  }
+}
+
+double sharpness_of(const cv::Mat& grey) {
+  cv::Mat laplacian;
+  cv::Laplacian(grey, laplacian, CV_16S);
+  cv::Scalar mean;
+  cv::Scalar deviation;
+  cv::meanStdDev(laplacian, mean, deviation);
+  return deviation[0] * deviation[0];
+}
+
+cv::Mat reduce(const cv::Mat& grey, int side_px) {
+  const int side = std::max(grey.cols, grey.rows);
+  if (side <= side_px) {
+    return grey.clone();
+  }
+  const double scale = static_cast<double>(side_px) / side;
+  cv::Mat reduced;
+  cv::resize(grey, reduced, {}, scale, scale, cv::INTER_AREA);
+  return reduced;
+}
+
+bool is_same_picture(const cv::Mat& a, const cv::Mat& b) {
+  return a.size() == b.size() &&
+         cv::norm(a, b, cv::NORM_L1) < kDuplicateDifference * static_cast<double>(a.total());
+}
+
+Result<> check_range(const char* name, double value, double min, double max) {
+  if (value >= min && value <= max) {
+    return {};
+  }
+  return fail(ErrorCode::kInvalidArgument, "{} is {}, must be {} to {}", name, value, min, max);
+}
+
+}  // namespace
+
+Result<> KeyframeOptions::validate() const {
+  TM_RETURN_IF_ERROR(check_range("image_side_px", image_side_px, 64, 2000));
+  TM_RETURN_IF_ERROR(check_range("focal_ratio", focal_ratio, 0.2, 10.0));
+  TM_RETURN_IF_ERROR(check_range("min_motion_deg", min_motion_deg, 1e-3, 30.0));
+  TM_RETURN_IF_ERROR(check_range("max_motion_deg", max_motion_deg, min_motion_deg, 90.0));
+  TM_RETURN_IF_ERROR(check_range("slow_motion_deg", slow_motion_deg, 1e-4, min_motion_deg));
+  TM_RETURN_IF_ERROR(check_range("max_overlap", max_overlap, min_overlap, 1.0));
+  TM_RETURN_IF_ERROR(check_range("min_overlap", min_overlap, lost_overlap, 1.0));
+  TM_RETURN_IF_ERROR(check_range("lost_overlap", lost_overlap, 1e-3, 1.0));
+  TM_RETURN_IF_ERROR(check_range("min_relative_sharpness", min_relative_sharpness, 0.0, 0.99));
+  TM_RETURN_IF_ERROR(check_range("max_step_loss", max_step_loss, 0.01, 0.99));
+  TM_RETURN_IF_ERROR(check_range("max_brightness_ratio", max_brightness_ratio, 1.001, 100.0));
+  if (slow_interval.count() <= 0 || stretch.count() <= 0 || min_interval.count() < 0) {
+    return fail(ErrorCode::kInvalidArgument,
+                "slow_interval and stretch must be more than 0 and min_interval not negative");
+  }
+  return tracker.validate();
+}
+
+Result<KeyframeSelector> KeyframeSelector::create(const KeyframeOptions& options) {
+  TM_RETURN_IF_ERROR(options.validate());
+  return KeyframeSelector(options);
+}
+
+std::vector<FrameDecision> KeyframeSelector::offer(const VideoFrame& frame) {
+  Candidate candidate = look_at(frame);
+  const bool is_duplicate =
+      !last_pyramid_.empty() && is_same_picture(last_pyramid_.front(), candidate.pyramid.front());
+  if (is_duplicate) {
+    decide(candidate, FrameVerdict::kDuplicate);
+  } else {
+    judge(std::move(candidate));
+  }
+  return std::exchange(decisions_, {});
+}
+
+std::vector<FrameDecision> KeyframeSelector::finish() {
+  while (!stretch_.empty()) {
+    close_stretch();
+  }
+  std::vector<FrameDecision> decisions = std::exchange(decisions_, {});
+  *this = KeyframeSelector(options_);
+  return decisions;
+}
+
+KeyframeSelector::Candidate KeyframeSelector::look_at(const VideoFrame& frame) {
+  TM_CHECK(frame.grey.type() == CV_8UC1);
+  Candidate candidate;
+  candidate.id = frame.id;
+  candidate.timestamp = frame.timestamp;
+  candidate.pyramid =
+      build_pyramid(reduce(frame.grey, options_.image_side_px), options_.tracker.levels);
+  const cv::Mat& grey = candidate.pyramid.front();
+  image_size_ = grey.size();
+  candidate.measures.sharpness = sharpness_of(grey);
+  candidate.measures.brightness = cv::mean(grey)[0];
+  remember(last_sharpness_, candidate.measures.sharpness, kSharpnessHistory);
+  candidate.measures.relative_sharpness =
+      candidate.measures.sharpness /
+      std::max(quantile(last_sharpness_, kSharpnessWindow, kUsualShare), 1e-9);
+  return candidate;
+}
+
+void KeyframeSelector::judge(Candidate candidate) {
+  const double brightness = std::max(candidate.measures.brightness, 1.0);
+  const double usual = last_brightness_.empty()
+                           ? brightness
+                           : std::max(quantile(last_brightness_, kBrightnessWindow, 0.5), 1.0);
+  // A jump that stays becomes the usual brightness after a few frames.
+  remember(last_brightness_, brightness, kBrightnessWindow);
+  if (std::max(brightness / usual, usual / brightness) > options_.max_brightness_ratio) {
+    decide(candidate, FrameVerdict::kExposureJump);
+    return;
+  }
+  place(std::move(candidate));
+}
+
+void KeyframeSelector::place(Candidate candidate) {
+  if (reference_.empty()) {
+    place_without_reference(std::move(candidate));
+    return;
+  }
+  const bool is_blurred = candidate.measures.relative_sharpness < options_.min_relative_sharpness;
+  if (is_blurred && stepped_over_ < kMostSteppedOver) {
+    ++stepped_over_;
+    decide(candidate, FrameVerdict::kBlurred);
+    return;
+  }
+  stepped_over_ = is_blurred ? stepped_over_ : 0;
+  follow_corners(candidate.pyramid);
+  measure_motion(candidate.measures);
+  if (candidate.measures.overlap < options_.lost_overlap) {
+    lose_track(std::move(candidate));
+  } else if (is_blurred) {
+    decide(candidate, FrameVerdict::kBlurred);
+  } else if (step_loss_ > options_.max_step_loss) {
+    decide(candidate, FrameVerdict::kTooFast);
+  } else {
+    extend_stretch(std::move(candidate));
+  }
+}
+
+void KeyframeSelector::place_without_reference(Candidate candidate) {
+  last_pyramid_ = candidate.pyramid;
+  candidate.is_wanted = true;
+  candidate.refusal = FrameVerdict::kBlurred;
+  if (stretch_.empty()) {
+    stretch_begin_ = candidate.timestamp;
+  }
+  stretch_.push_back(std::move(candidate));
+  if (stretch_.back().timestamp - *stretch_begin_ >= options_.stretch) {
+    close_stretch();
+  }
+}
+
+void KeyframeSelector::extend_stretch(Candidate candidate) {
+  candidate.is_wanted = has_moved(candidate);
+  candidate.refusal = candidate.is_wanted ? FrameVerdict::kBlurred : FrameVerdict::kTooLittleMotion;
+  const bool is_last = ends_stretch(candidate.measures);
+  const bool is_early = candidate.timestamp - *keyframe_time_ < options_.min_interval;
+  if (candidate.is_wanted && is_early && !is_last) {
+    decide(candidate, FrameVerdict::kOverBudget);
+    return;
+  }
+  if (candidate.is_wanted && !stretch_begin_.has_value()) {
+    stretch_begin_ = candidate.timestamp;
+  }
+  stretch_.push_back(std::move(candidate));
+  if (!stretch_begin_.has_value()) {
+    forget_early_frames();
+    return;
+  }
+  const bool is_over = stretch_.back().timestamp - *stretch_begin_ >= options_.stretch;
+  if ((is_last || is_over) && !may_wait(stretch_.back().measures)) {
+    close_stretch();
+  }
+}
+
+void KeyframeSelector::forget_early_frames() {
+  while (stretch_.back().timestamp - stretch_.front().timestamp > options_.patience) {
+    decide(stretch_.front(), stretch_.front().refusal);
+    stretch_.pop_front();
+  }
+}
+
+/// Whether it is worth and safe to wait for a sharper frame.
+bool KeyframeSelector::may_wait(const FrameMeasures& measures) const {
+  const std::chrono::nanoseconds waited = stretch_.back().timestamp - *stretch_begin_;
+  const double safe_overlap = 0.5 * (options_.min_overlap + options_.lost_overlap);
+  return is_blurry(stretch_[choose_keyframe()].measures.sharpness) &&
+         waited < options_.stretch + options_.patience && measures.overlap > safe_overlap;
+}
+
+bool KeyframeSelector::is_blurry(double sharpness) const {
+  return sharpness < quantile(last_sharpness_, kSharpnessHistory, kBlurriestShare);
+}
+
+void KeyframeSelector::lose_track(Candidate candidate) {
+  candidate.refusal =
+      step_loss_ > options_.max_step_loss ? FrameVerdict::kTooFast : FrameVerdict::kTrackLost;
+  stretch_.push_back(std::move(candidate));
+  // What was seen on the way connects: the frame is looked at again from there.
+  close_stretch();
+}
+
+/// Place of the sharpest wanted frame; the end if there is none.
+std::size_t KeyframeSelector::sharpest_wanted() const {
+  std::size_t best = stretch_.size();
+  for (std::size_t i = 0; i < stretch_.size(); ++i) {
+    const bool is_sharper = best == stretch_.size() ||
+                            stretch_[i].measures.sharpness > stretch_[best].measures.sharpness;
+    best = stretch_[i].is_wanted && is_sharper ? i : best;
+  }
+  return best;
+}
+
+/// Place of the frame to keep; the end if there is none.
+std::size_t KeyframeSelector::choose_keyframe() const {
+  std::size_t best = sharpest_wanted();
+  if (best == stretch_.size() || !is_blurry(stretch_[best].measures.sharpness)) {
+    return best;
+  }
+  for (std::size_t i = 0; i < stretch_.size(); ++i) {
+    const FrameMeasures& measures = stretch_[i].measures;
+    if (measures.motion_deg >= options_.slow_motion_deg &&
+        measures.sharpness > stretch_[best].measures.sharpness) {
+      best = i;
+    }
+  }
+  return best;
+}
+
+void KeyframeSelector::close_stretch() {
+  const std::size_t best = choose_keyframe();
+  const std::deque<Candidate> stretch = std::exchange(stretch_, {});
+  stretch_begin_.reset();
+  const bool has_keyframe = best < stretch.size() && start_from(stretch[best]);
+  if (!has_keyframe) {
+    reference_.clear();
+  }
+  for (std::size_t i = 0; i < stretch.size(); ++i) {
+    if (has_keyframe && i > best) {
+      place(stretch[i]);
+    } else {
+      decide(stretch[i], has_keyframe && i == best ? FrameVerdict::kKept : stretch[i].refusal);
+    }
+  }
+}
+
+bool KeyframeSelector::start_from(const Candidate& keyframe) {
+  reference_ = find_corners(keyframe.pyramid.front(), options_.tracker);
+  if (reference_.size() < kFewestCorners) {
+    return false;
+  }
+  corners_.assign(reference_.begin(), reference_.end());
+  last_pyramid_ = keyframe.pyramid;
+  keyframe_time_ = keyframe.timestamp;
+  return true;
+}
+
+void KeyframeSelector::follow_corners(const ImagePyramid& pyramid) {
+  std::vector<Eigen::Vector2f> before;
+  std::vector<std::size_t> index;
+  for (std::size_t i = 0; i < corners_.size(); ++i) {
+    if (corners_[i].has_value()) {
+      before.push_back(*corners_[i]);
+      index.push_back(i);
+    }
+  }
+  const std::vector<std::optional<Eigen::Vector2f>> after =
+      track_corners(last_pyramid_, pyramid, before, {}, options_.tracker);
+  std::size_t lost = 0;
+  for (std::size_t i = 0; i < index.size(); ++i) {
+    corners_[index[i]] = after[i];
+    lost += after[i].has_value() ? 0U : 1U;
+  }
+  step_loss_ = index.empty() ? 1.0 : static_cast<double>(lost) / static_cast<double>(index.size());
+  last_pyramid_ = pyramid;
+}
+
+void KeyframeSelector::measure_motion(FrameMeasures& measures) const {
+  std::vector<Eigen::Vector3d> first;
+  std::vector<Eigen::Vector3d> second;
+  for (std::size_t i = 0; i < corners_.size(); ++i) {
+    if (corners_[i].has_value()) {
+      first.push_back(ray_of(reference_[i]));
+      second.push_back(ray_of(*corners_[i]));
+    }
+  }
+  const ViewChange change = view_change(first, second);
+  measures.motion_deg = change.motion_deg;
+  measures.parallax_deg = change.parallax_deg;
+  measures.overlap = static_cast<double>(first.size()) / static_cast<double>(reference_.size());
+}
+
+bool KeyframeSelector::has_moved(const Candidate& candidate) const {
+  const FrameMeasures& measures = candidate.measures;
+  const bool is_slow = candidate.timestamp - *keyframe_time_ >= options_.slow_interval;
+  return measures.motion_deg >= (is_slow ? options_.slow_motion_deg : options_.min_motion_deg) ||
+         measures.overlap <= options_.max_overlap;
+}
+
+bool KeyframeSelector::ends_stretch(const FrameMeasures& measures) const {
+  return measures.motion_deg >= options_.max_motion_deg || measures.overlap <= options_.min_overlap;
+}
+
+void KeyframeSelector::decide(const Candidate& candidate, FrameVerdict verdict) {
+  decisions_.push_back({candidate.id, verdict, candidate.measures});
+}
+
+Eigen::Vector3d KeyframeSelector::ray_of(const Eigen::Vector2f& pixel) const {
+  const double focal_px = options_.focal_ratio * std::max(image_size_.width, image_size_.height);
+  const Eigen::Vector2d centre(0.5 * (image_size_.width - 1), 0.5 * (image_size_.height - 1));
+  return ((pixel.cast<double>() - centre) / focal_px).homogeneous().normalized();
+}
+
+}  // namespace trigmesh
