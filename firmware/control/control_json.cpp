@@ -52,6 +52,7 @@ std::string render_status(const ControlStatus& status) {
   json["queued_models"] = status.queued_models;
   json["available_bytes"] = status.available_bytes;
   json["software_version"] = status.software_version;
+  json["session_root"] = status.session_root;
   json["fault"] = status.fault;
   json["model_session"] = status.model_session_id;
   json["model_stage"] = status.model_stage;

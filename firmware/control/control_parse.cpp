@@ -177,6 +177,7 @@ Result<ControlStatus> parse_status(std::string_view json) {
   status.queued_models = fields.count<std::uint32_t>("queued_models");
   status.available_bytes = fields.count<std::uint64_t>("available_bytes");
   status.software_version = fields.text("software_version");
+  status.session_root = fields.text("session_root");
   status.fault = fields.text("fault");
   status.model_session_id = fields.text("model_session");
   status.model_stage = fields.text("model_stage");
@@ -202,6 +203,13 @@ Result<ExportReport> parse_export(std::string_view json) {
   report.file_count = fields.count<std::size_t>("files");
   report.size_bytes = fields.count<std::uint64_t>("size_bytes");
   return fields.finish(std::move(report));
+}
+
+Result<std::string> parse_phase_session(std::string_view json) {
+  const Json object = parsed(json);
+  Fields fields(object);
+  std::string session = fields.text("session");
+  return fields.finish(std::move(session));
 }
 
 Result<std::uint32_t> parse_frame_event(std::string_view json) {

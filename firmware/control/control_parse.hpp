@@ -25,6 +25,8 @@ namespace trigmesh {
 [[nodiscard]] Result<ExportReport> parse_export(std::string_view json);
 
 /// What an event says (see control_events).
+/// Of a phase event: the open session; empty: none.
+[[nodiscard]] Result<std::string> parse_phase_session(std::string_view json);
 [[nodiscard]] Result<std::uint32_t> parse_frame_event(std::string_view json);
 [[nodiscard]] Result<ModelEvent> parse_model_event(std::string_view json);
 [[nodiscard]] Result<ProgressEvent> parse_progress_event(std::string_view json);

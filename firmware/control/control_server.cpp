@@ -136,8 +136,10 @@ class ControlServer::Impl {
  private:
   void add_routes() {
     server_.Get("/v1/status", [this](const httplib::Request&, httplib::Response& response) {
-      answer(response, target_.status().map([this](ControlStatus status) {
-        status.last_event = events_.last_number();
+      // The number first: an event that comes between the two is told again rather than missed.
+      const std::uint64_t last_event = events_.last_number();
+      answer(response, target_.status().map([last_event](ControlStatus status) {
+        status.last_event = last_event;
         return render_status(status);
       }));
     });

@@ -23,6 +23,7 @@ struct ControlStatus {
   std::uint32_t queued_models = 0;    ///< closed sessions that wait for their model
   std::uint64_t available_bytes = 0;  ///< that may still be captured
   std::string software_version;
+  std::string session_root;       ///< folder of all sessions
   std::string fault;              ///< what keeps it from capturing, one sentence; empty: nothing
   std::string model_session_id;   ///< whose model is being made; empty: none
   std::string model_stage;        ///< of its making: "mapping"

@@ -18,8 +18,8 @@
 #include "firmware/daemon/auto_source.hpp"
 #include "firmware/daemon/model_worker.hpp"
 #include "firmware/daemon/restamped_source.hpp"
+#include "firmware/devices/device_list.hpp"
 #ifdef TRIGMESH_WITH_LIBCAMERA
-#include "drivers/camera/libcamera/camera_hub.hpp"
 #include "drivers/camera/libcamera/libcamera_source.hpp"
 #endif
 
@@ -197,20 +197,6 @@ std::unique_ptr<ModelMaker> make_model_worker(const Settings& settings,
       std::move(on_progress));
 }
 
-std::vector<DeviceInfo> gpio_chips() {
-  std::vector<DeviceInfo> chips;
-  std::error_code error;  // a board without them
-  for (const auto& entry : std::filesystem::directory_iterator("/dev", error)) {
-    if (entry.path().filename().string().starts_with("gpiochip")) {
-      chips.push_back({"gpio chip", entry.path().filename().string(), "", entry.path().string()});
-    }
-  }
-  std::sort(chips.begin(), chips.end(), [](const DeviceInfo& a, const DeviceInfo& b) {
-    return a.stable_name < b.stable_name;
-  });
-  return chips;
-}
-
 }  // namespace
 
 Result<DaemonDevices> make_devices(const Settings& settings, const Clock& clock) {
@@ -221,28 +207,7 @@ Result<DaemonDevices> make_devices(const Settings& settings, const Clock& clock)
   devices.make_models = [settings, &clock](ModelObserver observer) {
     return make_model_worker(settings, clock, std::move(observer));
   };
-  devices.list_devices = list_devices;
-  return devices;
-}
-
-Result<std::vector<DeviceInfo>> list_devices() {
-  std::vector<DeviceInfo> devices;
-  LinuxKernel kernel;
-  for (const CameraNode& camera : list_cameras(kernel)) {
-    devices.push_back({"camera",
-                       camera.stable_name,
-                       camera.model,
-                       fmt::format("v4l2, {}, driver {}", camera.path, camera.driver)});
-  }
-#ifdef TRIGMESH_WITH_LIBCAMERA
-  if (const auto cameras = list_libcamera_cameras()) {
-    for (const LibcameraCamera& camera : *cameras) {
-      devices.push_back({"camera", camera.stable_name, camera.model, "libcamera"});
-    }
-  }
-#endif
-  const std::vector<DeviceInfo> chips = gpio_chips();
-  devices.insert(devices.end(), chips.begin(), chips.end());
+  devices.list_devices = [] { return Result<std::vector<DeviceInfo>>(find_devices()); };
   return devices;
 }
 

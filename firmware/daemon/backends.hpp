@@ -1,6 +1,5 @@
 #pragma once
 
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -16,9 +15,6 @@ namespace trigmesh {
 /// The devices that the settings name; nothing is opened yet, and one that is away is no failure.
 /// kInvalidArgument, kNotFound (a recording), kIo. `clock` outlives them.
 [[nodiscard]] Result<DaemonDevices> make_devices(const Settings& settings, const Clock& clock);
-
-/// Cameras and GPIO chips that are there.
-[[nodiscard]] Result<std::vector<DeviceInfo>> list_devices();
 
 /// What the settings name and cannot be used now, a sentence each: opens every device once and
 /// closes it again.

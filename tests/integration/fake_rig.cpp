@@ -23,6 +23,14 @@ Result<> FakeRig::command(const std::string& what) {
 }
 
 Result<ControlStatus> FakeRig::status() {
+  std::function<void()> hook;
+  {
+    const std::lock_guard lock(mutex_);
+    hook = status_hook_;
+  }
+  if (hook) {
+    hook();
+  }
   const std::lock_guard lock(mutex_);
   return status_;
 }
@@ -81,6 +89,11 @@ void FakeRig::refuse_with(std::optional<Error> error) {
 void FakeRig::on_command(std::function<void(const std::string&)> hook) {
   const std::lock_guard lock(mutex_);
   hook_ = std::move(hook);
+}
+
+void FakeRig::on_status(std::function<void()> hook) {
+  const std::lock_guard lock(mutex_);
+  status_hook_ = std::move(hook);
 }
 
 ServedRig::ServedRig(const ControlOptions& options) {

@@ -47,6 +47,8 @@ class FakeRig final : public ControlTarget {
   void refuse_with(std::optional<Error> error);
   /// Called with each command, in the server's thread, after it is noted and before it is answered.
   void on_command(std::function<void(const std::string&)> hook);
+  /// Called, in the server's thread, before the status is told.
+  void on_status(std::function<void()> hook);
 
  private:
   Result<> command(const std::string& what);
@@ -56,6 +58,7 @@ class FakeRig final : public ControlTarget {
   ControlStatus status_;
   std::optional<Error> refusal_;
   std::function<void(const std::string&)> hook_;
+  std::function<void()> status_hook_;
 };
 
 /// A FakeRig behind a real server on a socket.

@@ -32,4 +32,12 @@ void add_calibrate_command(CLI::App& app, CommandContext& context);
 void add_export_command(CLI::App& app, CommandContext& context);
 void add_evaluate_command(CLI::App& app, CommandContext& context);
 
+// These talk to the service of the rig.
+void add_status_command(CLI::App& app, CommandContext& context);
+void add_trigger_command(CLI::App& app, CommandContext& context);
+void add_record_command(CLI::App& app, CommandContext& context);
+void add_watch_command(CLI::App& app, CommandContext& context);
+void add_sessions_command(CLI::App& app, CommandContext& context);
+void add_devices_command(CLI::App& app, CommandContext& context);
+
 }  // namespace trigmesh

@@ -1,16 +1,24 @@
-// trigmesh export: hands a model to another program.
+// trigmesh export: hands a model to another program, or a session of the rig to a stick.
 
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <stop_token>
 #include <string>
 #include <string_view>
 #include <system_error>
+#include <thread>
+
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 
 #include "firmware/base/check.hpp"
+#include "firmware/control/control_json.hpp"
+#include "firmware/control/control_parse.hpp"
+#include "firmware/session/session_id.hpp"
 #include "sfm/exchange/bundler.hpp"
 #include "sfm/exchange/file_io.hpp"
 #include "sfm/exchange/model_folder.hpp"
@@ -18,6 +26,7 @@
 #include "sfm/exchange/openmvs.hpp"
 #include "sfm/exchange/ply.hpp"
 #include "tools/trigmesh/command.hpp"
+#include "tools/trigmesh/rig_client.hpp"
 
 namespace trigmesh {
 namespace {
@@ -25,7 +34,12 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kFooter =
-    R"(MODEL is a result of `trigmesh reconstruct`, its model folder, or a folder of COLMAP files.
+    R"(Two things can be exported.
+
+A session of the rig, by its id, to a folder DEST, such as a mounted stick: a verified copy in DEST/ID, made by the
+service, which must be able to write there; Ctrl-C ends the waiting, not the copy.
+
+A model, to --output in a --format of another program. MODEL is a result of `trigmesh reconstruct`, its model folder, or a folder of COLMAP files.
 PATH is a folder; it is made when missing, and gets
   colmap-binary  cameras.bin images.bin points3D.bin
   colmap-text    cameras.txt images.txt points3D.txt
@@ -35,6 +49,7 @@ PATH is a folder; it is made when missing, and gets
 The last three name the photographs: in DIR as seen from PATH, or in PATH/images.
 
 Examples:
+  trigmesh export 20261125T145054Z-3fa9c1 /media/stick
   trigmesh export out --format colmap-binary --output out/colmap
   trigmesh export out --format nerfstudio --output nerf --images photos
   trigmesh export out --format openmvs --output mvs --images photos
@@ -49,6 +64,8 @@ struct ExportOptions {
   std::string format;
   std::string output;
   std::string images;
+  std::string destination;
+  RigArguments rig;
 };
 
 /// The folder of photographs as seen from the output folder.
@@ -118,21 +135,92 @@ Result<> export_model(const ExportOptions& options) {
   return {};
 }
 
+/// Shows how far the copy is, on a terminal, until it is stopped.
+void show_progress(const ControlClient& client, std::uint64_t after, const std::stop_token& stop) {
+  const auto show = [](const ControlEvent& event) {
+    if (event.kind != kExportEvent) {
+      return true;
+    }
+    if (const auto copied = parse_export_event(event.data)) {
+      fmt::print(stderr,
+                 "\r\033[K{} of {}",
+                 size_text(copied->copied_bytes),
+                 size_text(copied->all_bytes));
+    }
+    return true;
+  };
+  (void)client.watch(after, show, stop);  // only for show
+  fmt::print(stderr, "\r\033[K");
+}
+
+Result<ExportReport> ask_for_copy(const ControlClient& client, const ExportOptions& options) {
+  const fs::path destination = fs::absolute(options.destination).lexically_normal();
+  return client
+      .post_and_wait(fmt::format("/v1/sessions/{}/export", options.model),
+                     render_export_request(destination))
+      .and_then(parse_export);
+}
+
+Result<> export_session(const ExportOptions& options) {
+  const ControlClient client = options.rig.client();
+  TM_ASSIGN_OR_RETURN(const ControlStatus status, ask_status(client));
+  std::jthread progress;
+  if (::isatty(STDERR_FILENO) != 0) {
+    progress = std::jthread([&client, after = status.last_event](const std::stop_token& stop) {
+      show_progress(client, after, stop);
+    });
+  }
+  const auto report = ask_for_copy(client, options);
+  if (progress.joinable()) {
+    progress.request_stop();
+    progress.join();
+  }
+  return report.map([&](const ExportReport& copy) {
+    fmt::print("copied {} files, {}, to {}; each was read back and compared\n",
+               copy.file_count,
+               size_text(copy.size_bytes),
+               copy.folder.string());
+  });
+}
+
+/// The id of a session goes to the service, anything that exists is a model here.
+Result<> run(const ExportOptions& options) {
+  std::error_code ignored;  // what cannot be looked at is no model
+  const bool is_session = is_session_id(options.model) && !fs::exists(options.model, ignored);
+  const bool for_program = !options.format.empty() || !options.output.empty();
+  if (is_session && !options.destination.empty() && !for_program) {
+    return export_session(options);
+  }
+  if (!is_session && options.destination.empty() && !options.format.empty() &&
+      !options.output.empty()) {
+    return export_model(options);
+  }
+  return is_session ? fail(ErrorCode::kInvalidArgument,
+                           "{} is a session of the rig: name the folder to copy it to, without "
+                           "--format and --output",
+                           options.model)
+                    : fail(ErrorCode::kInvalidArgument,
+                           "{} is a model, not the id of a session: give --format and --output, "
+                           "and no further folder",
+                           options.model);
+}
+
 }  // namespace
 
 void add_export_command(CLI::App& app, CommandContext& context) {
-  CLI::App* command = app.add_subcommand("export", "Convert a model for another program");
+  CLI::App* command = app.add_subcommand(
+      "export", "Convert a model for another program, or copy a session of the rig to a stick");
   const auto options = std::make_shared<ExportOptions>();  // shared by the callback's copies
-  command->add_option("MODEL", options->model, "The model to convert")->required();
+  command->add_option("MODEL", options->model, "The model to convert, or the id of a session")
+      ->required();
+  command->add_option("DEST", options->destination, "Folder to copy the session to");
   command->add_option("--format", options->format, "What to write")
-      ->required()
       ->check(CLI::IsMember(formats()));
-  command->add_option("--output", options->output, "Folder to write to")
-      ->required()
-      ->option_text("PATH");
+  command->add_option("--output", options->output, "Folder to write to")->option_text("PATH");
   command->add_option("--images", options->images, "Folder of the photographs")->option_text("DIR");
+  add_socket_option(*command, options->rig);
   command->footer(kFooter);
-  command->callback([options, &context] { finish_command(context, export_model(*options)); });
+  command->callback([options, &context] { finish_command(context, run(*options)); });
 }
 
 }  // namespace trigmesh

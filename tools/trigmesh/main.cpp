@@ -17,6 +17,8 @@ constexpr const char* kFooter = R"(Examples:
   trigmesh calibrate photos --board 9x6 --square 25mm --output camera.toml
   trigmesh evaluate out --truth truth/images.txt
   trigmesh export out --format colmap-binary --output out/colmap
+  trigmesh record --seconds 20
+  trigmesh export 20261125T145054Z-3fa9c1 /media/stick
 `trigmesh SUBCOMMAND --help` has more.
 
 Exit codes:
@@ -37,6 +39,12 @@ void add_all_commands(CLI::App& app, trigmesh::CommandContext& context) {
   trigmesh::add_calibrate_command(app, context);
   trigmesh::add_evaluate_command(app, context);
   trigmesh::add_export_command(app, context);
+  trigmesh::add_status_command(app, context);
+  trigmesh::add_trigger_command(app, context);
+  trigmesh::add_record_command(app, context);
+  trigmesh::add_watch_command(app, context);
+  trigmesh::add_sessions_command(app, context);
+  trigmesh::add_devices_command(app, context);
 }
 
 int run(int argc, char** argv) {

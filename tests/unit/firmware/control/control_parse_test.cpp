@@ -65,6 +65,7 @@ TEST(ControlParse, ReadsEvents) {
   const ExportEvent exported{"id", 1, 2};
   EXPECT_EQ(parse_export_event(render_export_event(exported)).value(), exported);
   EXPECT_EQ(parse_frame_event(render_frame_event("id", 9)).value(), 9U);
+  EXPECT_EQ(parse_phase_session(render_phase_event(RigPhase::kIdle, "id")).value(), "id");
   EXPECT_EQ(render_phase_event(RigPhase::kIdle, ""), R"({"phase":"idle","session":""})");
 }
 
