@@ -1,11 +1,17 @@
 #include "drivers/camera/libcamera/camera_hub.hpp"
 
+#include <cstdint>
+#include <filesystem>
 #include <mutex>
+#include <system_error>
 #include <utility>
+
+#include <sys/stat.h>
 
 #include <libcamera/camera.h>
 #include <libcamera/camera_manager.h>
 #include <libcamera/property_ids.h>
+#include <libcamera/version.h>
 
 namespace trigmesh {
 
@@ -26,6 +32,29 @@ class CameraHub::Manager {
 
   [[nodiscard]] std::vector<std::shared_ptr<libcamera::Camera>> cameras() const {
     return manager_.cameras();
+  }
+
+  /// The numbers of its capture nodes.
+  [[nodiscard]] std::vector<dev_t> devices_of(const std::shared_ptr<libcamera::Camera>& camera) {
+    std::vector<dev_t> numbers;
+#if LIBCAMERA_VERSION_MAJOR == 0 && LIBCAMERA_VERSION_MINOR == 0
+    std::error_code error;
+    for (const auto& entry : std::filesystem::directory_iterator("/dev", error)) {
+      struct stat status {};
+
+      if (::stat(entry.path().c_str(), &status) == 0 && S_ISCHR(status.st_mode) &&
+          manager_.get(status.st_rdev) == camera) {
+        numbers.push_back(status.st_rdev);
+      }
+    }
+#else
+    if (const auto told = camera->properties().get(libcamera::properties::SystemDevices)) {
+      for (const std::int64_t number : *told) {
+        numbers.push_back(static_cast<dev_t>(number));
+      }
+    }
+#endif
+    return numbers;
   }
 
   void watch(const libcamera::Camera& camera, const std::weak_ptr<FrameExchange>& exchange) {
@@ -67,7 +96,8 @@ struct CameraHub::Process {
 };
 
 CameraHub::Process& CameraHub::process() {
-  static Process process;
+  // Never destroyed: the end of a manager whose camera went without its knowledge ends the process.
+  static Process& process = *new Process;
   return process;
 }
 
@@ -140,6 +170,10 @@ DeviceResult<LibcameraCamera> CameraHub::find(std::string_view name) {
       "package libcamera-ipa is installed, and that /dev/media* may be opened",
       name.empty() ? "at all" : name,
       names_of(cameras));
+}
+
+DevicePresence CameraHub::presence_of(const std::shared_ptr<libcamera::Camera>& camera) {
+  return DevicePresence::of_devices(manager_.devices_of(camera));
 }
 
 void CameraHub::watch(const libcamera::Camera& camera,

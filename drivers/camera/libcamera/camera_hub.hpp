@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "drivers/camera/libcamera/device_presence.hpp"
 #include "drivers/camera/libcamera/frame_exchange.hpp"
 #include "drivers/device/device_fault.hpp"
 
@@ -46,6 +47,9 @@ class CameraHub {
 
   /// Those that are there now, in libcamera's order.
   [[nodiscard]] std::vector<LibcameraCamera> list();
+
+  /// What tells whether the devices of a camera are still there.
+  [[nodiscard]] DevicePresence presence_of(const std::shared_ptr<libcamera::Camera>& camera);
 
   /// From now on the exchange is told when the camera is unplugged, and the camera's completed
   /// requests go nowhere from then on. Weak: a watch keeps nothing alive.

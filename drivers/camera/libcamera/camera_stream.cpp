@@ -222,6 +222,7 @@ DeviceResult<> CameraStream::allocate() {
 
 DeviceResult<> CameraStream::run(const StreamWish& wish) {
   hub_.watch(*camera_, exchange_);
+  presence_ = hub_.presence_of(camera_);
   camera_->requestCompleted.connect(this, &CameraStream::on_completed);
   libcamera::ControlList first(camera_->controls());
   frame_interval_ = request_rate(first, camera_->controls(), wish.wish);
@@ -281,13 +282,27 @@ std::uint64_t CameraStream::send(const SentControl& control) {
   return ++last_round_;
 }
 
+void CameraStream::notice_loss() {
+  if (!exchange_->is_gone() && presence_.is_lost()) {
+    is_abandoned_ = true;
+    exchange_->on_gone();
+  }
+}
+
 void CameraStream::end() {
   if (!is_acquired_) {
     return;
   }
   is_acquired_ = false;
   if (exchange_ != nullptr) {
+    notice_loss();
     exchange_->end();
+  }
+  if (is_abandoned_) {
+    // Nothing completes any more, and stop() would end the process: libcamera waits for requests
+    // that its driver does not give back.
+    camera_->requestCompleted.disconnect(this);
+    return;
   }
   // Returns when all requests are completed or cancelled and nothing more comes; a camera that went
   // does nothing here, and its signal was cut by the hub.

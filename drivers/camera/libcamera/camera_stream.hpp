@@ -63,6 +63,14 @@ class CameraStream {
   /// Stops the camera and lets it go; frames that are out stay readable.
   void end();
 
+  /// Looks whether the camera's devices are still there, and if not does what the hub does when
+  /// libcamera tells it. To be asked when nothing came for a while.
+  void notice_loss();
+
+  /// Whether the camera went without libcamera noticing. libcamera takes it for running: end() left
+  /// it as it is, and neither the stream nor its hub may be destroyed.
+  [[nodiscard]] bool is_abandoned() const { return is_abandoned_; }
+
   [[nodiscard]] const std::shared_ptr<FrameExchange>& exchange() const { return exchange_; }
 
   [[nodiscard]] const FrameLayout& layout() const { return layout_; }
@@ -98,7 +106,9 @@ class CameraStream {
   std::shared_ptr<FrameExchange> exchange_;  ///< shared with frames, which may outlive the stream
   FrameLayout layout_;
   std::chrono::nanoseconds frame_interval_{0};
+  DevicePresence presence_;
   bool is_acquired_ = false;
+  bool is_abandoned_ = false;
 
   std::mutex mutex_;                   ///< taken with the exchange locked
   std::vector<SentControl> pending_;   ///< guarded by mutex_; for the next request

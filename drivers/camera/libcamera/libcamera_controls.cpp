@@ -1,5 +1,6 @@
 #include "drivers/camera/libcamera/libcamera_controls.hpp"
 
+#include <algorithm>
 #include <array>
 #include <utility>
 
@@ -25,6 +26,8 @@ constexpr std::array<ControlId, 8> kAll = {
 
 /// A sensor takes a value two or three frames after its request, a lens some more.
 constexpr int kSettlingFrames = 12;
+/// After this long without a frame it is looked whether the camera is still there.
+constexpr nanoseconds kSilence = std::chrono::milliseconds(500);
 /// Only a camera that hangs needs all of it.
 constexpr std::chrono::seconds kPatience{5};
 
@@ -173,7 +176,11 @@ DeviceResult<FrameExchange::Progress> LibcameraControls::wait_for_frame(std::uin
                           exchange.count());
     }
     std::array<pollfd, 1> entries = {pollfd{exchange.ready().fd(), POLLIN, 0}};
-    if (const int ready = poll_until(entries, deadline - now, clock_); ready < 0) {
+    const int ready = poll_until(entries, std::min(deadline - now, kSilence), clock_);
+    if (ready == 0) {
+      stream_->notice_loss();
+    }
+    if (ready < 0) {
       return tl::unexpected<DeviceFault>(fault_of_errno(-ready, "cannot wait for camera", camera_));
     }
   }

@@ -1,5 +1,6 @@
 #include "drivers/camera/libcamera/libcamera_source.hpp"
 
+#include <algorithm>
 #include <array>
 #include <utility>
 
@@ -12,6 +13,8 @@ namespace trigmesh {
 namespace {
 
 constexpr std::size_t kFewestBuffers = 3;
+/// After this long without a frame it is looked whether the camera is still there.
+constexpr std::chrono::nanoseconds kSilence = std::chrono::milliseconds(500);
 constexpr std::size_t kMostBuffers = 32;  // of V4L2, on which pipelines stand
 
 }  // namespace
@@ -65,6 +68,12 @@ DeviceResult<> LibcameraSource::start() {
 }
 
 DeviceResult<> LibcameraSource::open_and_start() {
+  if (is_abandoned_) {
+    return device_fault(FaultKind::kDisconnected,
+                        "camera {} went without libcamera noticing, which cannot open it again; "
+                        "connect it and restart the program",
+                        info_.stable_name);
+  }
   if (hub_ == nullptr) {
     TM_ASSIGN_OR_FAULT(hub_, CameraHub::open());
   }
@@ -104,9 +113,14 @@ void LibcameraSource::close() {
   if (stream_ == nullptr) {
     return;
   }
-  const bool is_gone = stream_->exchange()->is_gone();
   stream_->end();
-  if (is_gone) {
+  if (stream_->is_abandoned()) {
+    // Left alive on purpose, with their hub: libcamera can neither stop nor forget such a camera,
+    // and ends the process when it is made to.
+    is_abandoned_ = true;
+    (void)stream_.release();
+    (void)hub_.release();
+  } else if (stream_->exchange()->is_gone()) {
     gone_stream_ = std::move(stream_);
   }
   stream_.reset();
@@ -180,7 +194,10 @@ std::optional<FrameEvent> LibcameraSource::wait_for_device(std::chrono::nanoseco
   }
   std::array<pollfd, 2> entries = {pollfd{stop_requested_.fd(), POLLIN, 0},
                                    pollfd{stream_->exchange()->ready().fd(), POLLIN, 0}};
-  const int ready = poll_until(entries, deadline - now, clock_);
+  const int ready = poll_until(entries, std::min(deadline - now, kSilence), clock_);
+  if (ready == 0) {
+    stream_->notice_loss();
+  }
   if (ready < 0) {
     return refuse(fault_of_errno(-ready, "cannot wait for camera", info_.stable_name));
   }

@@ -77,6 +77,7 @@ class LibcameraSource final : public FrameSource {
   std::unique_ptr<CameraHub> hub_;             ///< since the first start; goes after the streams
   std::unique_ptr<CameraStream> gone_stream_;  ///< of the camera that was unplugged last
   std::unique_ptr<CameraStream> stream_;       ///< nothing when stopped
+  bool is_abandoned_ = false;                  ///< the camera went and libcamera did not notice
   LibcameraControls controls_;
   WakeEvent stop_requested_;
   SourceInfo info_;
