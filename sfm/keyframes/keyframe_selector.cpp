@@ -118,8 +118,17 @@ std::vector<FrameDecision> KeyframeSelector::offer(const VideoFrame& frame) {
 }
 
 std::vector<FrameDecision> KeyframeSelector::finish() {
+  // A stretch that has not come to its end is worth a sharp frame only.
   while (!stretch_.empty()) {
-    close_stretch();
+    const std::size_t best = choose_keyframe();
+    if (best < stretch_.size() &&
+        (reference_.empty() || !is_blurry(stretch_[best].measures.sharpness))) {
+      close_stretch();
+      continue;
+    }
+    for (const Candidate& candidate : std::exchange(stretch_, {})) {
+      decide(candidate, candidate.refusal);
+    }
   }
   std::vector<FrameDecision> decisions = std::exchange(decisions_, {});
   *this = KeyframeSelector(options_);
@@ -265,7 +274,9 @@ std::size_t KeyframeSelector::choose_keyframe() const {
   }
   for (std::size_t i = 0; i < stretch_.size(); ++i) {
     const FrameMeasures& measures = stretch_[i].measures;
-    if (measures.motion_deg >= options_.slow_motion_deg &&
+    const bool is_early = keyframe_time_.has_value() &&
+                          stretch_[i].timestamp - *keyframe_time_ < options_.min_interval;
+    if (measures.motion_deg >= options_.slow_motion_deg && !is_early &&
         measures.sharpness > stretch_[best].measures.sharpness) {
       best = i;
     }
