@@ -11,6 +11,7 @@ set(suites
   tsan/tests/unit/drivers/trigger
   tsan/tests/unit/firmware/base
   tsan/tests/unit/firmware/daemon
+  tsan/tests/unit/firmware/daemon/models
   tsan/tests/unit/firmware/pipeline)
 set(content "# Written by tests/suites.cmake.\n")
 foreach(suite IN LISTS suites)

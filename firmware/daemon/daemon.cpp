@@ -90,6 +90,9 @@ Daemon::Daemon(DaemonOptions options,
                 devices_.list_devices},
                options_.command_patience) {
   TM_CHECK(camera_tried_.valid() && ended_.valid());
+  status_.update([this](ControlStatus& status) {
+    status.session_root = options_.storage.store.store.root.string();
+  });
   if (devices_.trigger) {
     trigger_ = std::make_unique<TriggerReader>(TriggerParts{
         *devices_.trigger, rig_queue_, faults_, heartbeats_.add("trigger"), place.clock});

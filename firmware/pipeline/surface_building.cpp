@@ -230,7 +230,9 @@ Result<> add_texture(Work& work, const TriangleMesh& mesh) {
       texture_surface(mesh, work.views, work.images, work.plan.texture, work.context.executor));
   work.report.texture = sum_up(made.report);
   warn(work.report, made.report.lowered_quality);
+  work.context.executor.stop_point();
   TM_ASSIGN_OR_RETURN(std::vector<NamedFile> files, write_obj(made.textured));
+  work.context.executor.stop_point();
   GlbOptions glb;
   glb.generator = fmt::format("trigmesh {}", work.input.options.software_version);
   TM_ASSIGN_OR_RETURN(work.glb, write_glb(made.textured, glb));

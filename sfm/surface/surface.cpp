@@ -65,14 +65,18 @@ Result<std::vector<std::uint16_t>> color_and_count(const SurfaceInput& input,
 void clean(const SurfaceOptions& options,
            const std::vector<std::uint16_t>& support,
            TriangleMesh& mesh,
-           SurfaceReport& report) {
+           SurfaceReport& report,
+           Executor& executor) {
   const auto voxel = static_cast<float>(report.voxel_size);
   report.unsupported_faces = remove_unsupported(support, options.min_support_views, mesh);
   const RemovedComponents removed = remove_small_components(options.min_component_area_ratio, mesh);
   report.removed_components = removed.components;
   report.removed_component_faces = removed.faces;
+  executor.stop_point();
   flatten_spikes(static_cast<float>(kSpikeVoxels) * voxel, mesh);
+  executor.stop_point();
   smooth(options.smoothing_passes, mesh);
+  executor.stop_point();
   FilledHoles holes =
       fill_holes(static_cast<float>(options.max_filled_hole_voxels) * voxel, voxel, mesh);
   report.filled_holes = holes.filled_count;
@@ -95,18 +99,23 @@ Result<SurfaceResult> make_surface(const SurfaceInput& input,
   report.extracted_faces = mesh.faces.size();
   TM_ASSIGN_OR_RETURN(const std::vector<std::uint16_t> support,
                       color_and_count(input, options, report.voxel_size, mesh, executor));
-  clean(options, support, mesh, report);
+  clean(options, support, mesh, report, executor);
   if (mesh.faces.empty()) {
     return fail(ErrorCode::kInsufficientData,
                 "cannot make a surface: nothing is left of {} faces that {} views gave",
                 report.extracted_faces,
                 report.view_count);
   }
+  executor.stop_point();
   make_two_manifold(mesh);
+  executor.stop_point();
   smooth_borders(kBorderPasses, mesh);
+  executor.stop_point();
   report.faces_before_simplification = mesh.faces.size();
   report.simplification_error = simplify(options.max_faces, mesh);
+  executor.stop_point();
   flip_slivers(mesh);
+  executor.stop_point();
   mesh.normals = vertex_normals(mesh);
   report.non_manifold_edges = analyze_topology(mesh).non_manifold_edges;
   return SurfaceResult{std::move(mesh), std::move(report)};

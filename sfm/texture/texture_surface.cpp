@@ -92,14 +92,17 @@ Result<SeenSurface> look_at_surface(const TriangleMesh& mesh,
 std::vector<std::uint32_t> choose_views(const FaceViews& faces,
                                         const FaceNeighbors& neighbors,
                                         std::size_t view_count,
-                                        const TextureOptions& options) {
+                                        const TextureOptions& options,
+                                        Executor& executor) {
   const LabelingProblem problem =
       make_labeling_problem(faces,
                             neighbors,
                             static_cast<std::uint32_t>(view_count),
                             options.seam_cost,
                             static_cast<std::size_t>(options.max_candidates));
+  executor.stop_point();
   std::vector<std::uint32_t> labels = label_faces(problem, options.labeling_sweeps);
+  executor.stop_point();
   absorb_small_charts(faces, neighbors, kSmallChartFaces, labels);
   return labels;
 }
@@ -220,19 +223,23 @@ Result<TextureResult> texture_surface(const TriangleMesh& given_mesh,
   result.report.rejected_look_count = agreed.rejected_count;
 
   const std::vector<std::uint32_t> labels =
-      choose_views(agreed.faces, neighbors, views.size(), options);
+      choose_views(agreed.faces, neighbors, views.size(), options, executor);
+  executor.stop_point();
 
   TM_ASSIGN_OR_RETURN(
       AtlasLayout layout,
       lay_out_atlas(mesh, views, labels, connected_charts(labels, neighbors), options.atlas));
   report_layout(mesh, layout, options.atlas, result.report);
   TM_ASSIGN_OR_RETURN(std::vector<cv::Mat> pages, copy_pictures(layout, views, images, executor));
+  executor.stop_point();
   const SeamLeveling leveling = level_seams(mesh, neighbors, layout, gains, pages);
   result.report.seam_step_before = leveling.step_before;
   result.report.seam_step_after_gains = leveling.step_after_gains;
   result.report.seam_step_after = leveling.step_after;
   finish_charts(layout, gains, leveling.offsets, options.atlas.padding_px, pages, executor);
+  executor.stop_point();
   paint_patches(mesh, layout, pages);
+  executor.stop_point();
   result.textured = assemble(mesh, layout, std::move(pages));
   return result;
 }
