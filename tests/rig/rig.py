@@ -77,8 +77,9 @@ def run_in_guest(rig, path):
         machine.put(path)
         output, status = machine.run(f"bash ./{path.name}", SCENARIO_LIMIT_S)
         if status != 0:
-            journal, _ = machine.run("journalctl --no-pager --quiet --lines=80 --output=short-monotonic; "
-                                     "systemctl status --no-pager --full trigmesh.service")
+            journal, _ = machine.run("journalctl --no-pager --quiet --unit=trigmesh.service --lines=60 "
+                                     "--output=short-monotonic; systemctl status --no-pager --full --lines=0 "
+                                     "trigmesh.service; dmesg | tail -5")
             output += f"\n--- journal of the guest\n{journal}"
         if status == 124:
             output += f"\nthe scenario took more than {SCENARIO_LIMIT_S} s"
