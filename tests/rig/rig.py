@@ -17,7 +17,7 @@ from machine import Machine, MachineError, run
 HERE = pathlib.Path(__file__).resolve().parent
 # The longest a scenario may take; a hung one is a failed one.
 SCENARIO_LIMIT_S = 400
-PROGRAMS = ["conformance_camera", "conformance_trigger", "rig_check_store", "rig_uvc_camera", "rig_uvc_camera_test",
+PROGRAMS = ["conformance_camera", "conformance_trigger", "rig_check_store", "rig_colour_bars", "rig_uvc_camera", "rig_uvc_camera_test",
             "rig_vivid_camera", "rig_vivid_feeder"]
 
 
