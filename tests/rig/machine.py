@@ -37,7 +37,8 @@ class Machine:
             self.disks.append(overlay)
         self._console = self.folder / "console.log"
         command = [
-            "qemu-system-x86_64", "-accel", "tcg,thread=multi,tb-size=256", "-cpu", PROCESSOR, "-M", "q35",
+            # Does not outlive whoever started it, however that ends.
+            "setpriv", "--pdeathsig", "KILL", "qemu-system-x86_64", "-accel", "tcg,thread=multi,tb-size=256", "-cpu", PROCESSOR, "-M", "q35",
             "-smp", str(processors), "-m", str(memory_mb), "-nodefaults", "-no-user-config", "-display", "none",
             "-no-reboot", "-kernel", kernel_of(guest), "-initrd", guest / "kernel/initrd",
             "-append", "console=ttyS0 quiet panic=-1 mitigations=off systemd.show_status=0 audit=0 root=/dev/vda rw",

@@ -17,7 +17,7 @@ from machine import Machine, MachineError, run
 HERE = pathlib.Path(__file__).resolve().parent
 # The longest a scenario may take; a hung one is a failed one.
 SCENARIO_LIMIT_S = 400
-PROGRAMS = ["conformance_camera", "conformance_trigger", "rig_check_store", "rig_uvc_camera", "rig_uvc_camera_test",
+PROGRAMS = ["conformance_camera", "conformance_trigger", "rig_check_store", "rig_colour_bars", "rig_uvc_camera", "rig_uvc_camera_test",
             "rig_vivid_camera", "rig_vivid_feeder"]
 
 
@@ -77,8 +77,9 @@ def run_in_guest(rig, path):
         machine.put(path)
         output, status = machine.run(f"bash ./{path.name}", SCENARIO_LIMIT_S)
         if status != 0:
-            journal, _ = machine.run("journalctl --no-pager --quiet --lines=80 --output=short-monotonic; "
-                                     "systemctl status --no-pager --full trigmesh.service")
+            journal, _ = machine.run("journalctl --no-pager --quiet --unit=trigmesh.service --lines=60 "
+                                     "--output=short-monotonic; systemctl status --no-pager --full --lines=0 "
+                                     "trigmesh.service; dmesg | tail -5")
             output += f"\n--- journal of the guest\n{journal}"
         if status == 124:
             output += f"\nthe scenario took more than {SCENARIO_LIMIT_S} s"

@@ -1,5 +1,5 @@
 # What scenarios share; each begins with `. ./helpers.sh`. Runs in the guest, in /run/rig.
-set -euo pipefail
+set -Eeuo pipefail
 
 settings=/etc/trigmesh/trigmesh.toml
 store=/var/lib/trigmesh/sessions
@@ -7,6 +7,10 @@ panel=/sys/kernel/config/gpio-sim/rig
 vivid_camera=/dev/v4l/by-path/platform-vivid.0-video-index0
 uvc_camera=/dev/v4l/by-id/usb-Trigmesh_Rig_camera_0001-video-index0
 trap 'echo "$0: line $LINENO failed: $BASH_COMMAND"' ERR
+
+# Waits without a process of its own: in the guest each costs tens of milliseconds.
+exec 9<> <(:)
+pause() { read -r -t "$1" -u 9 || true; }
 
 fail() {
   echo "FAILED: $*"
@@ -20,7 +24,7 @@ wait_until() {
   until "$@"; do
     [ "$SECONDS" -lt "$end" ] || fail "waited in vain until $what"
     # The guest has nothing that wakes us on any of this; a short pause leaves the processor to the service.
-    sleep 0.2
+    pause 0.2
   done
 }
 
@@ -36,18 +40,19 @@ panel_up() {
   echo buzzer >$panel/bank0/line6/name
   echo 1 >$panel/live
   udevadm settle
+  button=$(line 3)/pull
   let_go
 }
 line() { echo "/sys/devices/platform/$(cat $panel/dev_name)/$(cat $panel/bank0/chip_name)/sim_gpio$1"; }
-push() { echo pull-down >"$(line 3)/pull"; }
-let_go() { echo pull-up >"$(line 3)/pull"; }
+push() { echo pull-down >"$button"; }
+let_go() { echo pull-up >"$button"; }
 # push_for SECONDS
 push_for() {
   push
-  sleep "$1"
+  pause "$1"
   let_go
 }
-light() { cat "$(line 5)/value"; }
+long_push() { push_for 4; }
 
 # ---- cameras
 # vivid shows our own pictures on its HDMI input: vivid_up [FRAMES_A_SECOND]
@@ -97,6 +102,8 @@ small_settings() {
   set_key camera rate_hz 30
   set_key trigger chip '"rigpanel"'
   set_key trigger line 3
+  # Three seconds: what the script holds for a tenth may take the guest a whole one.
+  set_key trigger long_press_ms 3000
   set_key indicator chip '"rigpanel"'
   set_key indicator light_line 5
   set_key storage reserve_mb 20
@@ -139,6 +146,8 @@ session_has() { [ "$(session_count)" -gt 0 ] && [ "$(frame_count "$(newest)")" -
 # newer_has SESSION N: there is a later session, with N frames
 newer_has() { [ "$(newest)" != "$1" ] && session_has "$2"; }
 is_closed() { case $(state_of "$1") in capturing | interrupted) return 1 ;; esac; }
+ended() { state_is "$1" "model ready" || state_is "$1" "model failed"; }
+both_ended() { ended "$1" && ended "$2"; }
 camera_is() { [ "$(status camera_present)" = "$1" ]; }
 fault_tells() { status fault | grep -q "$1"; }
 storage_is() { [ "$(status storage)" = "$1" ]; }
@@ -151,12 +160,13 @@ answered() {
   [ $((kept + missed)) -ge "$2" ]
 }
 
-# ---- the light, read back from the line: samples of two and a half seconds
+# ---- the light, read back from the line: samples of about three seconds
 light_samples() {
-  local i
-  for i in $(seq 25); do
-    light
-    sleep 0.1
+  local value
+  value=$(line 5)/value
+  for _ in $(seq 25); do
+    cat "$value"
+    pause 0.1
   done
 }
 light_is_steady() { [ "$(light_samples | sort -u)" = 1 ]; }
