@@ -1,0 +1,140 @@
+// What a frame costs between the camera and the disk: processor time (both threads' work in one)
+// and calls of operator new, for frames that are not kept and frames that are.
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include <benchmark/benchmark.h>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "drivers/camera/slot_pool.hpp"
+#include "firmware/base/check.hpp"
+#include "firmware/daemon/frame_copies.hpp"
+#include "firmware/daemon/frame_store.hpp"
+#include "firmware/daemon/still_shelf.hpp"
+#include "firmware/daemon/stream_selector.hpp"
+#include "sfm/exchange/image_codec.hpp"
+#include "tests/conformance/allocation_counter.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace trigmesh {
+namespace {
+
+using std::chrono::milliseconds;
+
+enum Picture : int { kYuyv640x480, kMjpg1280x720 };
+
+cv::Mat textured(int width, int height, int channels) {
+  cv::RNG random(3);
+  cv::Mat picture(height, width, CV_8UC(channels), cv::Scalar::all(120));
+  for (int i = 0; i < 3000; ++i) {
+    const cv::Rect square(random.uniform(0, width), random.uniform(0, height), 24, 24);
+    const cv::Scalar colour(random.uniform(0, 255), random.uniform(0, 255), random.uniform(0, 255));
+    cv::rectangle(picture, square, colour, cv::FILLED);
+  }
+  return picture;
+}
+
+/// A camera that gives the same frame again and again.
+class Camera {
+ public:
+  explicit Camera(Picture picture) : pool_(std::make_shared<SlotPool>(1, nullptr)) {
+    if (picture == kYuyv640x480) {
+      const cv::Mat pixels = textured(640, 480, 2);
+      bytes_.assign(pixels.data, pixels.data + pixels.total() * pixels.elemSize());
+      info_.layout.format = PixelFormat::kYuyv;
+      info_.layout.width_px = 640;
+      info_.layout.height_px = 480;
+      info_.layout.stride_bytes = 1280;
+    } else {
+      bytes_ = encode_jpeg(textured(1280, 720, 3), 90).value();
+      info_.layout.format = PixelFormat::kJpeg;
+    }
+    const std::size_t slot = *pool_->take();
+    pool_->bytes(slot) = bytes_;
+    pool_->give_back(slot);
+  }
+
+  [[nodiscard]] Frame frame() {
+    const std::size_t slot = *pool_->take();
+    return {info_, pool_->bytes(slot), pool_, slot};
+  }
+
+  [[nodiscard]] std::size_t size_bytes() const { return bytes_.size(); }
+
+ private:
+  std::shared_ptr<SlotPool> pool_;
+  std::vector<std::uint8_t> bytes_;
+  FrameInfo info_;
+};
+
+FrameTimes at(std::uint64_t sequence) {
+  const std::chrono::nanoseconds time = sequence * milliseconds(33);
+  return {time, time, time};
+}
+
+/// Runs `use(frame, sequence)` and counts.
+template <typename Use>
+void measure(benchmark::State& state, Use use) {
+  Camera camera(static_cast<Picture>(state.range(0)));
+  std::uint64_t sequence = 0;
+  for (; sequence < 64; ++sequence) {  // every buffer has held a frame once
+    use(camera.frame(), sequence);
+  }
+  const auto before = conformance::allocations_of_this_thread();
+  for (auto _ : state) {
+    use(camera.frame(), sequence++);
+  }
+  const auto after = conformance::allocations_of_this_thread();
+  if (before && after) {
+    state.counters["allocations_per_frame"] = benchmark::Counter(
+        static_cast<double>(*after - *before), benchmark::Counter::kAvgIterations);
+  }
+  state.counters["frame_bytes"] = static_cast<double>(camera.size_bytes());
+}
+
+/// Still mode, nobody presses: the last frames are held.
+void hold_last_frames(benchmark::State& state) {
+  FrameCopies copies(16);
+  StillShelf shelf({.history = 8, .wait = milliseconds(2000)}, copies);
+  measure(state, [&](const Frame& frame, std::uint64_t sequence) {
+    TM_CHECK(shelf.offer(frame, at(sequence), sequence));
+  });
+}
+
+/// Video mode: the sharpest of five is chosen; nothing is stored.
+void choose_among_frames(benchmark::State& state) {
+  FrameCopies copies(16);
+  StreamSelector selector(5, copies);
+  selector.begin({});
+  measure(state, [&](const Frame& frame, std::uint64_t sequence) {
+    benchmark::DoNotOptimize(selector.offer(frame, at(sequence), sequence));
+  });
+}
+
+/// A frame that is kept: encoded if it is raw, hashed, written, fsynced, in the journal.
+void store_frame(benchmark::State& state) {
+  const test_support::TemporaryFolder folder(test_support::folder_in_memory());
+  SteadyClock clock;
+  SystemWallClock wall_clock;
+  FrameStoreOptions options;
+  options.store.root = folder.path();
+  FrameStore store(options, {real_file_system(), clock, wall_clock});
+  TM_CHECK(store.open().has_value());
+  TM_CHECK(store.begin_session().has_value());
+  FrameCopies copies(2);
+  measure(state, [&](const Frame& frame, std::uint64_t sequence) {
+    const TimedFrame timed{copies.copy(frame, sequence), at(sequence), sequence};
+    TM_CHECK(store.add_frame(timed).has_value());
+  });
+}
+
+BENCHMARK(hold_last_frames)->Arg(kYuyv640x480)->Arg(kMjpg1280x720);
+BENCHMARK(choose_among_frames)->Arg(kYuyv640x480)->Arg(kMjpg1280x720);
+BENCHMARK(store_frame)->Arg(kYuyv640x480)->Arg(kMjpg1280x720)->Iterations(200);
+
+}  // namespace
+}  // namespace trigmesh
