@@ -150,6 +150,7 @@ TEST_F(Still, ADoublePressDiscardsTheLastFrame) {
   ASSERT_TRUE(control().still());
   ASSERT_TRUE(control().still());
   EXPECT_EQ(status().frames, 2U);
+  await("frame", "\"frames\":2}");
   press_and_release();
   press_and_release();
   await("frame", "\"frames\":1}");
