@@ -86,7 +86,7 @@ TEST_F(DaemonFaults, StartsWithAFolderThatCannotBeWritten) {
   disk_.is_read_only = true;
   start_daemon();
   await("camera", "true");
-  await_that([&] { return status().phase == RigPhase::kFault; });
+  await_that([&] { return status().fault.find("storage") != std::string::npos; });
   disk_.is_read_only = false;
   await("storage", "ok");
   EXPECT_TRUE(control().start());
