@@ -195,7 +195,7 @@ TEST_F(DaemonRestart, ASessionThatWasOpenIsClosedAndGetsItsModel) {
   drop_daemon();
   const std::size_t acknowledged = kept_of(id).size();
   start_daemon();
-  await("phase", "working");
+  await_that([&] { return models_.begun().size() == 1; });
   EXPECT_THAT(models_.begun(), ElementsAre(id));
   EXPECT_EQ(kept_of(id).size(), acknowledged);
 }
