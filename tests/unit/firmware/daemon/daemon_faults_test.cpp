@@ -86,7 +86,7 @@ TEST_F(DaemonFaults, StartsWithAFolderThatCannotBeWritten) {
   disk_.is_read_only = true;
   start_daemon();
   await("camera", "true");
-  await_that([&] { return status().phase == RigPhase::kFault; });
+  await_that([&] { return status().fault.find("storage") != std::string::npos; });
   disk_.is_read_only = false;
   await("storage", "ok");
   EXPECT_TRUE(control().start());
@@ -195,7 +195,7 @@ TEST_F(DaemonRestart, ASessionThatWasOpenIsClosedAndGetsItsModel) {
   drop_daemon();
   const std::size_t acknowledged = kept_of(id).size();
   start_daemon();
-  await("phase", "working");
+  await_that([&] { return models_.begun().size() == 1; });
   EXPECT_THAT(models_.begun(), ElementsAre(id));
   EXPECT_EQ(kept_of(id).size(), acknowledged);
 }
