@@ -146,7 +146,7 @@ session_has() { [ "$(session_count)" -gt 0 ] && [ "$(frame_count "$(newest)")" -
 # newer_has SESSION N: there is a later session, with N frames
 newer_has() { [ "$(newest)" != "$1" ] && session_has "$2"; }
 is_closed() { case $(state_of "$1") in capturing | interrupted) return 1 ;; esac; }
-ended() { state_is "$1" "model ready" || state_is "$1" "model failed"; }
+ended() { state_is "$1" model_ready || state_is "$1" model_failed; }
 both_ended() { ended "$1" && ended "$2"; }
 camera_is() { [ "$(status camera_present)" = "$1" ]; }
 fault_tells() { status fault | grep -q "$1"; }
