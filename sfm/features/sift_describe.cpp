@@ -7,6 +7,8 @@
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "sfm/features/sift_describe.cpp"
+// SVE vectors cannot be kept in arrays; such machines run the NEON code.
+#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
@@ -29,7 +31,7 @@ struct Grid {
   static constexpr int kSide = kGridSide;
   static constexpr int kSize = kSide * kSide;
   static constexpr int kStorage = kSize + 2 * kSide + kVectorSlack;
-  using Array = std::array<float, kStorage>;
+  using Array = std::array<float, static_cast<std::size_t>(kStorage)>;
 
   alignas(64) Array column{};
   alignas(64) Array row{};
