@@ -109,6 +109,10 @@ void spread_queries(const DescriptorRows& a,
 
 template <class Scorer>
 struct Tile {
+  /// Written out, because g++ builds an implicit one without the instructions of the target.
+  HWY_INLINE Tile() {
+  }  // NOLINT(cppcoreguidelines-pro-type-member-init,modernize-use-equals-default)
+
   VectorOf<Scorer> score[kRowsPerGroup][kVectorsPerBlock];
 };
 
