@@ -106,7 +106,7 @@ endfunction()
 
 # trigmesh_add_fuzzer(NAME fuzz_colmap_text SOURCES .. LIBRARIES .. CORPUS dir)
 # A libFuzzer program; ctest runs it for TRIGMESH_FUZZ_SECONDS on its committed corpus (label fuzz).
-set(TRIGMESH_FUZZ_SECONDS 60 CACHE STRING "Seconds that each fuzz target runs under ctest")
+set(TRIGMESH_FUZZ_SECONDS 25 CACHE STRING "Seconds that each fuzz target runs under ctest")
 function(trigmesh_add_fuzzer)
   cmake_parse_arguments(ARG "" "NAME;CORPUS" "SOURCES;LIBRARIES" ${ARGN})
   if(NOT TRIGMESH_BUILD_FUZZ)
