@@ -42,7 +42,8 @@ Result<> check_bars(const fs::path& path) {
   DecodeOptions options;
   options.channels = ImageChannels::kRgb;
   TM_ASSIGN_OR_RETURN(const DecodedImage image, decode_image(bytes, options));
-  for (const double height : {0.1, 0.5, 0.9}) {
+  // Above and below the text that the pattern shows, from a tenth to half of the height.
+  for (const double height : {0.04, 0.6, 0.95}) {
     const int row = static_cast<int>(height * image.rgb.rows);
     std::string seen;
     for (std::size_t bar = 0; bar < kBars.size(); ++bar) {

@@ -12,7 +12,8 @@ from machine import MachineError, run
 HERE = pathlib.Path(__file__).resolve().parent
 SEED = 4
 CUTS_OF_A_PHASE = 10
-REBOOTS = 3
+# Longest time between two cuts, s: a capture takes a few seconds, a model some tens.
+LONGEST_GAP_S = {"capturing": 1.5, "working": 7.0}
 PATIENCE_S = 300
 
 
@@ -40,7 +41,8 @@ def cut_at_random(rig, log):
     chance = random.Random(SEED)
     load = Load()
     left = {"capturing": CUTS_OF_A_PHASE, "working": CUTS_OF_A_PHASE}
-    cuts = []
+    cuts = {phase: [] for phase in left}
+    number = 0
     with rig.machine("06_power_cut.py") as machine:
         machine.put(HERE / "power_cut_load")
         machine.begin("bash ./power_cut_load", PATIENCE_S)
@@ -48,12 +50,12 @@ def cut_at_random(rig, log):
         while any(left.values()):
             if time.monotonic() > end:
                 raise MachineError(f"the machine did not capture and work for long enough, cuts left: {left}")
-            machine.listen(chance.uniform(0.1, 1.5), load.hear)
+            machine.listen(chance.uniform(0.1, LONGEST_GAP_S.get(load.phase, 1.0)), load.hear)
             if left.get(load.phase, 0) == 0:
                 continue
             machine.freeze()
             machine.listen(0, load.hear)
-            folder = rig.work / f"06_power_cut.py.cut{len(cuts):02}"
+            folder = rig.work / f"06_power_cut.py.cut{number:02}"
             shutil.rmtree(folder, ignore_errors=True)
             folder.mkdir()
             for disk in machine.disks:
@@ -62,8 +64,9 @@ def cut_at_random(rig, log):
             acknowledged = "".join(f"{session} {count}\n" for session, count in load.acknowledged.items())
             (folder / "acknowledged.txt").write_text(acknowledged)
             left[load.phase] -= 1
-            cuts.append(folder)
-            log.append(f"cut {len(cuts)}: {load.phase}, acknowledged {dict(load.acknowledged)}")
+            cuts[load.phase].append(folder)
+            number += 1
+            log.append(f"{folder.name}: {load.phase}, acknowledged {dict(load.acknowledged)}")
     return cuts
 
 
@@ -75,7 +78,7 @@ def data_after(folder):
     if checked.returncode > 1:
         raise MachineError(f"the file system is beyond its own repair: {checked.stdout}")
     files.mkdir()
-    run("debugfs", "-R", f"rdump / {files}", raw)
+    subprocess.run(["debugfs", "-R", f"rdump / {files}", raw], stderr=subprocess.DEVNULL, check=True)
     raw.unlink()
     return files
 
@@ -92,7 +95,7 @@ def recover_on_host(rig, folder, store):
     settings = folder / "trigmesh.toml"
     settings.write_text(f"[storage]\nroot = \"{store}\"\nreserve_mb = 10\n[trigger]\nbackend = \"none\"\n"
                         "[indicator]\nbackend = \"none\"\n[camera]\nbackend = \"replay\"\n"
-                        f"device = \"{rig.feed / 'mjpg'}\"\n[reconstruction]\nenabled = false\n")
+                        f"device = \"{HERE.parents[2] / 'tools/demo/courtyard'}\"\n[reconstruction]\nenabled = false\n")
     command = [rig.programs / "trigmeshd", "--settings", settings, "--socket", folder / "control.sock"]
     with open(folder / "trigmeshd.log", "wb") as log:
         service = subprocess.Popen([str(word) for word in command], stdout=log, stderr=log)
@@ -114,21 +117,21 @@ def scenario(rig):
     log = []
     cuts = cut_at_random(rig, log)
     success = True
-    for folder in cuts:
+    for folder in sum(cuts.values(), []):
         store = data_after(folder) / "sessions"
         if not store.is_dir():
             continue
         success &= check(rig, folder, store, log)
         recover_on_host(rig, folder, store)
         success &= check(rig, folder, store, log, "--settled")
-    # Some of them for real: another boot, which ends with a model of each session that has enough frames.
-    for folder in random.Random(SEED).sample(cuts[CUTS_OF_A_PHASE // 2:], REBOOTS):
+    # One of each phase for real: another boot, which ends with a model of each session that has enough frames.
+    for folder in (random.Random(SEED).choice(folders) for folders in cuts.values()):
         with rig.reboot(f"{folder.name}.boot", [folder / "disk.qcow2", folder / "data.qcow2"]) as machine:
             machine.put(HERE / "power_cut_check", folder / "acknowledged.txt")
             output, status = machine.run("bash ./power_cut_check", PATIENCE_S)
         log.append(f"{folder.name}: booted again\n{output}")
         success &= status == 0
     if success:
-        for folder in cuts:
+        for folder in sum(cuts.values(), []):
             shutil.rmtree(folder)
     return "\n".join(log), success

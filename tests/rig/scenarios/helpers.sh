@@ -152,6 +152,7 @@ camera_is() { [ "$(status camera_present)" = "$1" ]; }
 fault_tells() { status fault | grep -q "$1"; }
 storage_is() { [ "$(status storage)" = "$1" ]; }
 pid_is_not() { local now; now=$(main_pid); [ "$now" != "$1" ] && [ "$now" != 0 ] && systemctl is-active --quiet trigmesh.service; }
+is_gone() { [ ! -e "/proc/$1" ]; }
 # answered SESSION PRESSES: kept frames and missed ones make up all presses
 answered() {
   local kept missed
