@@ -46,7 +46,7 @@ class CornerTracker : public ::testing::Test {
     return largest;
   }
 
-  const CornerTrackerOptions options_;
+  const CornerTrackerOptions options_{};
   const cv::Mat first_ = textured_image(320, 240, 7);
   const std::vector<Vector2f> corners_ = find_corners(first_, options_);
   std::size_t followed_ = 0;
