@@ -159,10 +159,10 @@ SparseDepth interpolate_landmarks(const Scene& scene, ViewId view_id, int width_
     return sparse;
   }
   const cv::Size size(sparse.map.camera.width_px, sparse.map.camera.height_px);
-  sparse.map.depth = cv::Mat::zeros(size, CV_32FC1);
-  sparse.map.normal = cv::Mat::zeros(size, CV_32FC3);
-  sparse.map.confidence = cv::Mat::zeros(size, CV_8UC1);
-  sparse.image.rgb = cv::Mat::zeros(size, CV_8UC3);
+  sparse.map.depth = cv::Mat(size, CV_32FC1, cv::Scalar::all(0.0));
+  sparse.map.normal = cv::Mat(size, CV_32FC3, cv::Scalar::all(0.0));
+  sparse.map.confidence = cv::Mat(size, CV_8UC1, cv::Scalar::all(0.0));
+  sparse.image.rgb = cv::Mat(size, CV_8UC3, cv::Scalar::all(0.0));
   for (const auto& triangle : triangulate(points, sparse.map.camera)) {
     draw({&points[triangle[0]], &points[triangle[1]], &points[triangle[2]]}, sparse);
   }

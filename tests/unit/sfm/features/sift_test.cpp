@@ -1,9 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 #include <random>
-#include <span>
 #include <thread>
 #include <vector>
 
@@ -141,18 +139,22 @@ cv::Point2d place(const Keypoint& keypoint) {
   return {static_cast<double>(keypoint.x_px), static_cast<double>(keypoint.y_px)};
 }
 
-std::size_t nearest_descriptor(const FeatureSet& features, std::span<const std::uint8_t> wanted) {
-  int best = -1;
-  std::size_t best_index = 0;
-  for (std::size_t j = 0; j < features.size(); ++j) {
-    const auto row = features.descriptor(j);
-    const int dot = std::inner_product(row.begin(), row.end(), wanted.begin(), 0);
-    if (dot > best) {
-      best = dot;
-      best_index = j;
-    }
+cv::Mat descriptor_rows(const FeatureSet& features) {
+  cv::Mat rows(static_cast<int>(features.size()), 128, CV_32F);
+  std::copy(features.descriptors.begin(), features.descriptors.end(), rows.begin<float>());
+  return rows;
+}
+
+/// For each feature of `from` the index of the one in `to` with the most similar descriptor.
+std::vector<std::size_t> nearest_descriptors(const FeatureSet& from, const FeatureSet& to) {
+  const cv::Mat similarity = descriptor_rows(from) * descriptor_rows(to).t();
+  std::vector<std::size_t> nearest;
+  for (int i = 0; i < similarity.rows; ++i) {
+    cv::Point best;
+    cv::minMaxLoc(similarity.row(i), nullptr, nullptr, nullptr, &best);
+    nearest.push_back(static_cast<std::size_t>(best.x));
   }
-  return best_index;
+  return nearest;
 }
 
 /// Compares the keypoints of a 400x400 image and of its warp by the similarity `warp`. Left out are
@@ -165,6 +167,7 @@ Repeat compare(const FeatureSet& from,
   const double scale = std::hypot(warp(0, 0), warp(1, 0));
   const double turn = std::atan2(warp(1, 0), warp(0, 0));
   const cv::Rect2d inside(border, border, 400 - 2 * border, 400 - 2 * border);
+  const std::vector<std::size_t> nearest = nearest_descriptors(from, to);
   int visible = 0;
   int repeated = 0;
   std::vector<double> angle_errors;
@@ -185,7 +188,7 @@ Repeat compare(const FeatureSet& from,
       continue;
     }
     ++repeated;
-    const Keypoint& match = to.keypoints[nearest_descriptor(to, from.descriptor(i))];
+    const Keypoint& match = to.keypoints[nearest[i]];
     if (is_repeat(match)) {
       const double error = static_cast<double>(match.angle_rad - a.angle_rad) - turn;
       angle_errors.push_back(std::abs(std::remainder(error, 2.0 * std::numbers::pi)));
