@@ -30,14 +30,14 @@ TEST(Faults, TellWhatDoesNotWorkUntilItDoes) {
 TEST(Faults, AreLoggedWhenTheyBeginWhenTheyEndAndInBetweenOnceInAnInterval) {
   test_support::ManualClock clock;
   Faults faults(clock, seconds(60));
-  testing::internal::CaptureStdout();  // where spdlog goes until it is set up
+  testing::internal::CaptureStderr();
   faults.report("camera", "gone");
   for (int i = 0; i < 119; ++i) {
     clock.time += seconds(1);
     faults.report("camera", "gone");
   }
   faults.clear("camera");
-  const std::string lines = testing::internal::GetCapturedStdout();
+  const std::string lines = testing::internal::GetCapturedStderr();
   EXPECT_EQ(std::count(lines.begin(), lines.end(), '\n'), 3) << lines;
 }
 
