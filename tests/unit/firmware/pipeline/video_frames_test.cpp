@@ -22,8 +22,8 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-constexpr int kWidth = 320;
-constexpr int kHeight = 240;
+constexpr int kWidth = 160;
+constexpr int kHeight = 120;
 
 class Silence final : public ProgressListener {
  public:
@@ -100,18 +100,18 @@ TEST(WantsKeyframes, NotOfPhotographsWithoutTimes) {
 }
 
 TEST(ChooseKeyframes, KeepsFewOfManyAndSaysWhatBecameOfEach) {
-  const std::vector<Encoded> files = pan(60, 2);
+  const std::vector<Encoded> files = pan(30, 2);
   const PhotoSet video = video_of(files);
   const auto chosen = choose(video, 1);
   ASSERT_TRUE(chosen) << chosen.error().message;
-  EXPECT_THAT(chosen->frames, SizeIs(60));
-  EXPECT_NEAR(chosen->frames.back().time_s, 59 * 0.033, 1e-9);
+  EXPECT_THAT(chosen->frames, SizeIs(30));
+  EXPECT_NEAR(chosen->frames.back().time_s, 29 * 0.033, 1e-9);
   const std::size_t kept = chosen->photos.names.size();
   EXPECT_GT(kept, 3U);
-  EXPECT_LT(kept, 30U);
+  EXPECT_LT(kept, 20U);
   EXPECT_THAT(chosen->photos.timestamps, SizeIs(kept));
   EXPECT_THAT(chosen->photos.description,
-              HasSubstr("pan, " + std::to_string(kept) + " of 60 frames kept"));
+              HasSubstr("pan, " + std::to_string(kept) + " of 30 frames kept"));
   std::size_t position = 0;
   for (std::size_t i = 0; i < files.size(); ++i) {
     if (chosen->frames[i].verdict == FrameVerdict::kKept) {
@@ -125,7 +125,7 @@ TEST(ChooseKeyframes, KeepsFewOfManyAndSaysWhatBecameOfEach) {
 }
 
 TEST(ChooseKeyframes, DoesNotDependOnTheNumberOfThreads) {
-  const std::vector<Encoded> files = pan(40, 3);
+  const std::vector<Encoded> files = pan(20, 3);
   const PhotoSet video = video_of(files);
   EXPECT_EQ(verdicts_of(*choose(video, 1)), verdicts_of(*choose(video, 3)));
 }
@@ -141,7 +141,7 @@ TEST(ChooseKeyframes, LeavesFramesThatAreNoPictureToTheNextStage) {
 }
 
 TEST(ChooseKeyframes, ReadsTheMaskOfTheFrameThatWasKept) {
-  std::vector<Encoded> files = pan(60, 2);
+  std::vector<Encoded> files = pan(30, 2);
   PhotoSet video = video_of(files);
   video.read_mask = [](std::size_t i) -> Result<std::optional<Encoded>> {
     return Encoded{static_cast<std::uint8_t>(i)};
