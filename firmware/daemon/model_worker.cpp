@@ -5,6 +5,7 @@
 #include <system_error>
 #include <utility>
 
+#include <malloc.h>
 #include <pthread.h>
 #include <signal.h>
 #include <sys/resource.h>
@@ -216,6 +217,8 @@ void ModelWorker::serve(const std::stop_token& end) {
     const std::stop_token stop = job_stop_.get_token();
     lock.unlock();
     const ModelAnswer answer = make_model(std::move(session), stop);
+    // A model leaves its threads' arenas full of holes, 70 kB more each time: back to the system.
+    ::malloc_trim(0);
     on_answer_(answer);
     lock.lock();
   }

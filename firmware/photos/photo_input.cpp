@@ -21,6 +21,12 @@ Result<PhotoSet> open_photos(const std::string& input, Subfolders subfolders, Ma
   photos.ordered = (recording.kind() == RecordingKind::kRecording ||
                     recording.kind() == RecordingKind::kSession) &&
                    recording.frames().front().timestamp.has_value();
+  // The rig chose the frames of a session when it recorded them.
+  if (photos.ordered && recording.kind() == RecordingKind::kRecording) {
+    for (const RecordedFrame& frame : recording.frames()) {
+      photos.timestamps.push_back(*frame.timestamp);
+    }
+  }
   const auto masked = std::count_if(
       recording.frames().begin(), recording.frames().end(), [](const RecordedFrame& frame) {
         return !frame.mask_path.empty();

@@ -14,6 +14,25 @@ constexpr double kLeaveOutFrom = 128.0;
 
 }  // namespace
 
+PhotoSet subset(const PhotoSet& photos, const std::vector<std::size_t>& positions) {
+  PhotoSet result;
+  for (const std::size_t i : positions) {
+    result.names.push_back(photos.names[i]);
+    if (!photos.timestamps.empty()) {
+      result.timestamps.push_back(photos.timestamps[i]);
+    }
+  }
+  result.ordered = photos.ordered;
+  result.description = photos.description;
+  result.read = [&photos, positions](std::size_t i) { return photos.read(positions[i]); };
+  if (photos.read_mask) {
+    result.read_mask = [&photos, positions](std::size_t i) {
+      return photos.read_mask(positions[i]);
+    };
+  }
+  return result;
+}
+
 Result<std::optional<std::vector<std::uint8_t>>> read_mask(const PhotoSet& photos,
                                                            std::size_t photo) {
   if (!photos.read_mask) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -19,13 +20,19 @@ namespace trigmesh {
 struct PhotoSet {
   std::vector<std::string> names;  ///< unique, in input order
   bool ordered = false;            ///< neighbours in the list are neighbours in time
-  std::string description;         ///< for the report, e.g. "photo folder, 25 photographs"
+  /// When each was taken, rising, for the frames of a video from which keyframes may be chosen;
+  /// empty: every photograph is wanted.
+  std::vector<std::chrono::nanoseconds> timestamps{};
+  std::string description;  ///< for the report, e.g. "photo folder, 25 photographs"
   /// The encoded bytes (JPEG or PNG) of a photograph. Thread-safe.
   std::function<Result<std::vector<std::uint8_t>>(std::size_t)> read;
   /// The encoded mask of a photograph, white = leave out; nothing when it has none. Thread-safe;
   /// may be empty: no photograph has a mask.
   std::function<Result<std::optional<std::vector<std::uint8_t>>>(std::size_t)> read_mask;
 };
+
+/// The photographs at these positions, ascending. Reads from `photos`, which outlives it.
+[[nodiscard]] PhotoSet subset(const PhotoSet& photos, const std::vector<std::size_t>& positions);
 
 /// The encoded mask of a photograph; nothing when it has none.
 [[nodiscard]] Result<std::optional<std::vector<std::uint8_t>>> read_mask(const PhotoSet& photos,

@@ -7,18 +7,20 @@ namespace trigmesh {
 
 /// The stages of a reconstruction, in order.
 enum class Stage {
-  kExtract,      ///< photographs -> keypoints and descriptors
-  kSelectPairs,  ///< which images are worth comparing
-  kMatch,        ///< pairs -> verified matches
-  kMap,          ///< images -> poses and points
-  kDepth,        ///< views -> depth maps
-  kFuse,         ///< depth maps -> dense cloud
-  kSurface,      ///< depth maps -> mesh
-  kTexture,      ///< mesh and views -> textured mesh
-  kWrite,        ///< model and report -> files
+  kSelectFrames,  ///< video -> keyframes
+  kExtract,       ///< photographs -> keypoints and descriptors
+  kSelectPairs,   ///< which images are worth comparing
+  kMatch,         ///< pairs -> verified matches
+  kMap,           ///< images -> poses and points
+  kDepth,         ///< views -> depth maps
+  kFuse,          ///< depth maps -> dense cloud
+  kSurface,       ///< depth maps -> mesh
+  kTexture,       ///< mesh and views -> textured mesh
+  kWrite,         ///< model and report -> files
 };
 
-/// "features", "pairs", "matching", "mapping", "depth", "fusion", "surface", "texture", "writing".
+/// "frames", "features", "pairs", "matching", "mapping", "depth", "fusion", "surface", "texture",
+/// "writing".
 [[nodiscard]] std::string_view to_string(Stage stage);
 
 /// How far a stage is. `total` may be 0 while it is not known.

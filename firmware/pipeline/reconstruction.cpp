@@ -24,6 +24,9 @@ namespace trigmesh {
 namespace {
 
 constexpr int kMaxThreads = 256;
+// What KeyframeOptions allows.
+constexpr double kMinFocalRatio = 0.2;
+constexpr double kMaxFocalRatio = 10.0;
 
 /// Size of the largest photograph, from the headers of the files; files that cannot be read count
 /// as empty.
@@ -117,6 +120,7 @@ std::vector<PairEvidence> evidence_of(const std::vector<PairRecord>& pairs) {
 }
 
 ReconstructionReport report_on(const PhotoSet& photos,
+                               std::span<const VideoFrameSection> frames,
                                const ReconstructionOptions& options,
                                const MemoryPlan& plan,
                                const CameraGroups& cameras,
@@ -127,6 +131,7 @@ ReconstructionReport report_on(const PhotoSet& photos,
   ReportInput input;
   input.components = mapped.components;
   input.images = mapped.outcomes;
+  input.frames = frames;
   input.pairs = evidence;
   input.intrinsics_origins = origins;
   input.settings = report_settings(options, plan);
@@ -146,6 +151,7 @@ ReconstructionReport report_on_model(const PhotoSet& photos,
   ReportInput input;
   input.components = model.components;
   input.images = history.images;
+  input.frames = history.frames;
   input.pairs = history.pairs;
   input.intrinsics_origins = history.intrinsics_origins;
   input.settings = history.settings;
@@ -167,6 +173,8 @@ bool is_finished(LastStage last) {
 
 std::string_view to_string(Stage stage) {
   switch (stage) {
+    case Stage::kSelectFrames:
+      return "frames";
     case Stage::kExtract:
       return "features";
     case Stage::kSelectPairs:
@@ -210,6 +218,7 @@ namespace {
 /// What is needed from the first stage to the last.
 struct Run {
   const PhotoSet& photos;
+  std::span<const VideoFrameSection> frames;  ///< of the video that the photographs are from
   const ReconstructionPlaces& places;
   const ReconstructionOptions& options;
   const CheckpointFolder& checkpoints;
@@ -271,7 +280,7 @@ Result<ReconstructionSummary> run_stages(const Run& run) {
 
   run.listener.on_progress({Stage::kWrite, 0, 1});
   ReconstructionSummary summary{
-      report_on(run.photos, options, plan, features.cameras, pairs, mapped), {}};
+      report_on(run.photos, run.frames, options, plan, features.cameras, pairs, mapped), {}};
   TM_RETURN_IF_ERROR(write_model(run.places.model, mapped.components, summary.report));
   run.listener.on_progress({Stage::kWrite, 1, 1});
   run.stopwatch.finish(Stage::kWrite);
@@ -282,6 +291,40 @@ Result<ReconstructionSummary> run_stages(const Run& run) {
                                      summary.report));
   }
   return summary;
+}
+
+/// What the selector has to know of the lens.
+KeyframeOptions keyframe_options(const ReconstructionOptions& options) {
+  KeyframeOptions keyframes;
+  if (!options.cameras.empty()) {
+    const Camera& camera = options.cameras.front();
+    keyframes.focal_ratio = std::clamp(
+        camera.fx_px / std::max(camera.width_px, camera.height_px), kMinFocalRatio, kMaxFocalRatio);
+  }
+  return keyframes;
+}
+
+/// All stages, on the keyframes if the photographs are frames of a video.
+Result<ReconstructionSummary> run_on_frames(const Run& run) {
+  TM_ASSIGN_OR_RETURN(const bool selects, wants_keyframes(run.photos, run.options.frames));
+  if (!selects) {
+    return run_stages(run);
+  }
+  const auto chosen = [&]() -> Result<ChosenFrames> {
+    WorkerPool pool(run.options.num_threads, run.stop, &run.listener);
+    return choose_keyframes(
+        run.photos, keyframe_options(run.options), {pool, run.checkpoints, run.listener, run.stop});
+  }();
+  TM_RETURN_IF_ERROR(chosen);
+  run.stopwatch.finish(Stage::kSelectFrames);
+  return run_stages({chosen->photos,
+                     chosen->frames,
+                     run.places,
+                     run.options,
+                     run.checkpoints,
+                     run.listener,
+                     run.stop,
+                     run.stopwatch});
 }
 
 /// Writes the times and tidies up.
@@ -321,8 +364,8 @@ Result<ReconstructionSummary> reconstruct(const PhotoSet& photos,
   }
   TM_ASSIGN_OR_RETURN(const CheckpointFolder checkpoints, CheckpointFolder::open(places.work));
   Stopwatch stopwatch(clock);
-  const Run run{photos, places, options, checkpoints, listener, stop, stopwatch};
-  TM_ASSIGN_OR_RETURN(ReconstructionSummary summary, stoppable([&] { return run_stages(run); }));
+  const Run run{photos, {}, places, options, checkpoints, listener, stop, stopwatch};
+  TM_ASSIGN_OR_RETURN(ReconstructionSummary summary, stoppable([&] { return run_on_frames(run); }));
   TM_RETURN_IF_ERROR(finish(run, summary));
   return summary;
 }

@@ -18,6 +18,7 @@
 #include "firmware/pipeline/progress.hpp"
 #include "firmware/pipeline/report.hpp"
 #include "firmware/pipeline/stopwatch.hpp"
+#include "firmware/pipeline/video_frames.hpp"
 #include "sfm/features/features.hpp"
 #include "sfm/mapping/mapper.hpp"
 #include "sfm/matching/pair_selection.hpp"
@@ -26,6 +27,7 @@ namespace trigmesh {
 
 /// Settings of a reconstruction.
 struct ReconstructionOptions {
+  FrameUse frames = FrameUse::kAuto;
   FeatureKind feature_kind = FeatureKind::kSift;
   FeatureOptions features;
   PairMode pair_mode = PairMode::kAuto;

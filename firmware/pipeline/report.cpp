@@ -383,6 +383,7 @@ ReconstructionReport build_report(const ReportInput& input) {
   }
   report.pairs.assign(input.pairs.begin(), input.pairs.end());
   std::ranges::stable_sort(report.pairs, {}, &PairEvidence::pair);
+  report.frames.assign(input.frames.begin(), input.frames.end());
   report.settings = input.settings;
   report.notes = input.notes;
   std::ranges::stable_sort(report.notes, [](const ReportNote& a, const ReportNote& b) {

@@ -78,6 +78,7 @@ struct ReportInput {
   std::span<const ImageOutcome>
       images;  ///< in input order; views of the components are found by name
   std::span<const PairEvidence> pairs;
+  std::span<const VideoFrameSection> frames;  ///< of a video, in order of time; empty: no video
   std::span<const IntrinsicsOrigin>
       intrinsics_origins;  ///< per camera group; kSolved where the span ends early
   std::vector<ReportSetting> settings;
@@ -144,8 +145,9 @@ struct ReconstructionReport {
   ComponentReport overall;         ///< all components together
   std::vector<ComponentReport> components;
   std::vector<CameraReport> cameras;
-  std::vector<ImageReport> images;  ///< input order
-  std::vector<PairEvidence> pairs;  ///< sorted by pair
+  std::vector<ImageReport> images;        ///< input order
+  std::vector<VideoFrameSection> frames;  ///< all of the video; empty: photographs
+  std::vector<PairEvidence> pairs;        ///< sorted by pair
   Histogram reprojection_error_px;
   Histogram track_length;             ///< images per point
   Histogram triangulation_angle_deg;  ///< per point: the largest angle between two of its rays

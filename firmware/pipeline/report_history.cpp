@@ -25,6 +25,16 @@ constexpr std::array kTwoViewKinds{
     TwoViewKind::kWatermark,
     TwoViewKind::kDuplicate,
 };
+constexpr std::array kVerdicts{
+    FrameVerdict::kKept,
+    FrameVerdict::kBlurred,
+    FrameVerdict::kTooLittleMotion,
+    FrameVerdict::kTooFast,
+    FrameVerdict::kExposureJump,
+    FrameVerdict::kDuplicate,
+    FrameVerdict::kTrackLost,
+    FrameVerdict::kOverBudget,
+};
 constexpr std::array kOrigins{
     IntrinsicsOrigin::kGiven, IntrinsicsOrigin::kPriorRefined, IntrinsicsOrigin::kSolved};
 
@@ -48,6 +58,14 @@ Result<std::size_t> count_of(const Json& object, const char* name) {
   return member->get<std::size_t>();
 }
 
+Result<double> number_of(const Json& object, const char* name) {
+  const auto member = object.find(name);
+  if (member == object.end() || !member->is_number()) {
+    return bad_member(name, "is no number");
+  }
+  return member->get<double>();
+}
+
 template <typename Enum>
 Result<Enum> one_of(const Json& object, const char* name, std::span<const Enum> values) {
   TM_ASSIGN_OR_RETURN(const std::string text, text_of(object, name));
@@ -69,6 +87,21 @@ Result<ImageOutcome> parse_image(const Json& json) {
   TM_ASSIGN_OR_RETURN(image.map_matches, count_of(json, "map_matches"));
   TM_ASSIGN_OR_RETURN(image.map_inliers, count_of(json, "map_inliers"));
   return image;  // the rest is computed from the scenes
+}
+
+Result<VideoFrameSection> parse_frame(const Json& json) {
+  VideoFrameSection frame;
+  FrameMeasures& measures = frame.measures;
+  TM_ASSIGN_OR_RETURN(frame.name, text_of(json, "name"));
+  TM_ASSIGN_OR_RETURN(frame.time_s, number_of(json, "time_s"));
+  TM_ASSIGN_OR_RETURN(frame.verdict, one_of<FrameVerdict>(json, "verdict", kVerdicts));
+  TM_ASSIGN_OR_RETURN(measures.sharpness, number_of(json, "sharpness"));
+  TM_ASSIGN_OR_RETURN(measures.relative_sharpness, number_of(json, "relative_sharpness"));
+  TM_ASSIGN_OR_RETURN(measures.brightness, number_of(json, "brightness"));
+  TM_ASSIGN_OR_RETURN(measures.motion_deg, number_of(json, "motion_deg"));
+  TM_ASSIGN_OR_RETURN(measures.parallax_deg, number_of(json, "parallax_deg"));
+  TM_ASSIGN_OR_RETURN(measures.overlap, number_of(json, "overlap"));
+  return frame;
 }
 
 Result<PairEvidence> parse_pair(const Json& json, std::size_t image_count) {
@@ -138,6 +171,13 @@ Result<ReportHistory> parse_report_history(std::string_view json) {
     history.images.push_back(std::move(image));
     return {};
   }));
+  if (document.contains("frames")) {  // the first reports had none
+    TM_RETURN_IF_ERROR(for_each_in(document, "frames", [&](const Json& element) -> Result<> {
+      TM_ASSIGN_OR_RETURN(VideoFrameSection frame, parse_frame(element));
+      history.frames.push_back(std::move(frame));
+      return {};
+    }));
+  }
   TM_RETURN_IF_ERROR(for_each_in(document, "pairs", [&](const Json& element) -> Result<> {
     TM_ASSIGN_OR_RETURN(PairEvidence pair, parse_pair(element, history.images.size()));
     history.pairs.push_back(pair);

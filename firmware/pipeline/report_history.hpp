@@ -12,6 +12,7 @@ namespace trigmesh {
 /// What a report tells of the stages up to mapping: what a scene alone does not know.
 struct ReportHistory {
   std::vector<ImageOutcome> images;
+  std::vector<VideoFrameSection> frames;             ///< of the video, if it was one
   std::vector<PairEvidence> pairs;                   ///< positions are < images.size()
   std::vector<IntrinsicsOrigin> intrinsics_origins;  ///< per camera group; kSolved where untold
   std::vector<ReportSetting> settings;

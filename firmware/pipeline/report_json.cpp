@@ -94,6 +94,21 @@ Json to_json(const ImageReport& image) {
   };
 }
 
+Json to_json(const VideoFrameSection& frame) {
+  const FrameMeasures& measures = frame.measures;
+  return {
+      {"name", frame.name},
+      {"time_s", rounded(frame.time_s, kRatioDigits)},
+      {"verdict", to_string(frame.verdict)},
+      {"sharpness", rounded(measures.sharpness, 2)},
+      {"relative_sharpness", rounded(measures.relative_sharpness, kRatioDigits)},
+      {"brightness", rounded(measures.brightness, 1)},
+      {"motion_deg", rounded(measures.motion_deg, kAngleDigits)},
+      {"parallax_deg", rounded(measures.parallax_deg, kAngleDigits)},
+      {"overlap", rounded(measures.overlap, kRatioDigits)},
+  };
+}
+
 Json to_json(const PairEvidence& pair) {
   return {
       {"first", index(pair.pair.first)},
@@ -224,6 +239,7 @@ std::string render_report_json(const ReconstructionReport& report) {
       {"components", list(report.components)},
       {"cameras", list(report.cameras)},
       {"images", list(report.images)},
+      {"frames", list(report.frames)},
       {"pairs", list(report.pairs)},
       {"histograms",
        {

@@ -7,10 +7,21 @@
 
 #include <Eigen/Core>
 
+#include "sfm/keyframes/frame_verdict.hpp"
+
 namespace trigmesh {
 
-// What the stages after mapping came to, for the report. Plain data, filled by the pipeline; the
-// sections that are missing are not shown. Lengths are in scene units, areas in their squares.
+// What the stages before and after mapping came to, for the report. Plain data, filled by the
+// pipeline; the sections that are missing are not shown. Lengths are in scene units, areas in their
+// squares.
+
+/// A frame of the video from which the photographs were chosen.
+struct VideoFrameSection {
+  std::string name;
+  double time_s = 0.0;  ///< since the first frame
+  FrameVerdict verdict = FrameVerdict::kKept;
+  FrameMeasures measures{};
+};
 
 /// Depth maps and the cloud that was made of them.
 struct DenseSection {

@@ -262,6 +262,46 @@ TEST_F(Reconstruct, KeepsTheMemoryLimitOrSaysWhatItNeeds) {
   EXPECT_THAT(small.out, HasSubstr("to keep the memory limit"));
 }
 
+TEST_F(Reconstruct, UsesTheKeyframesOfAVideoAndSaysWhatBecameOfEachFrame) {
+  const std::vector<std::string> video{"reconstruct",
+                                       demo().string(),
+                                       "--output",
+                                       path("out"),
+                                       "--stop-after",
+                                       "sparse",
+                                       "--frames",
+                                       "keyframes",
+                                       "--camera",
+                                       (demo() / "gt/cameras.txt").string()};
+  const ProgramResult result = run_trigmesh(video, kTimeLimit);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto report = nlohmann::json::parse(contents(path("out/model/report.json")));
+  const auto& frames = report["frames"];
+  const auto pictures = std::distance(fs::directory_iterator(demo() / "images"), {});
+  EXPECT_EQ(frames.size(), static_cast<std::size_t>(pictures));
+  std::vector<std::string> kept;
+  for (const auto& frame : frames) {
+    if (frame["verdict"] == "kept") {
+      kept.push_back(frame["name"]);
+    }
+  }
+  std::vector<std::string> used;
+  for (const auto& image : report["images"]) {
+    used.push_back(image["name"]);
+  }
+  EXPECT_EQ(used, kept);
+  EXPECT_LT(used.size(), frames.size());
+  EXPECT_EQ(report["totals"]["images_registered"], used.size());
+  EXPECT_THAT(contents(path("out/timings.json")), HasSubstr("\"frames\""));
+}
+
+TEST_F(Reconstruct, HasNoKeyframesOfPhotographsWithoutTimes) {
+  take_demo_frames(20);
+  const ProgramResult result = run({"--frames", "keyframes"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("timestamps.csv"));
+}
+
 TEST_F(Reconstruct, ExplainsItself) {
   const ProgramResult help = run_trigmesh({"reconstruct", "--help"});
   EXPECT_EQ(help.exit_code, 0);

@@ -141,6 +141,20 @@ TEST_F(ReportPage, DrawsAModel) {
   EXPECT_THAT(visit.dom, HasSubstr("10 of 11 images are registered, 1 is refused."));
 }
 
+TEST_F(ReportPage, DrawsTheFramesOfAVideo) {
+  ReportInput input;
+  const std::vector<VideoFrameSection> frames{
+      {"a.jpg", 0.0, FrameVerdict::kKept, {.sharpness = 40.0, .relative_sharpness = 1.0}},
+      {"<b>.jpg", 0.03, FrameVerdict::kTooLittleMotion, {.relative_sharpness = 0.9}},
+      {"c.jpg", 0.07, FrameVerdict::kBlurred, {.relative_sharpness = 0.2}}};
+  input.frames = frames;
+  const Visit visit = open(render_report_html(build_report(input), {}), "#check");
+  expect_sound(visit);
+  EXPECT_THAT(visit.dom, HasSubstr("1 of 3 frames kept"));
+  EXPECT_EQ(count_of(visit.dom, "class=\"frame frame-"), 3U);
+  EXPECT_THAT(visit.dom, HasSubstr("blurred 1"));
+}
+
 TEST_F(ReportPage, DrawsAModelWithoutWebgl) {
   const test_support::SyntheticScene scene = test_support::make_synthetic_scene({.noise_px = 0.3});
   const Visit visit = open(page_of(scene), "#2d-check");

@@ -23,11 +23,13 @@ constexpr const char* kFooter = R"(Examples:
   trigmesh reconstruct photos --output model
   trigmesh reconstruct photos --output model --camera rig.toml
   trigmesh reconstruct recording --output model --match sequential --threads 2
+  trigmesh reconstruct video --output model --frames keyframes
   trigmesh reconstruct photos --output model --preset preview
   trigmesh reconstruct list.txt --output model --stop-after sparse --memory-limit 500M
 
 INPUT is a folder of JPEG or PNG photographs, a text file with one path a line, or a recording (a folder with
-images/ and, if there is one, timestamps.csv). The result is OUTPUT/model: sparse/ (COLMAP text), projections.txt,
+images/ and, if there is one, timestamps.csv). Of a recording with 10 frames a second or more only keyframes are used:
+the sharpest frame of each stretch with enough motion; the report says of each frame why. The result is OUTPUT/model: sparse/ (COLMAP text), projections.txt,
 sparse.ply, dense.ply, mesh.ply, textured.glb, textured.obj, report.json and report.html. When interrupted, the same
 command goes on where it stopped.
 )";
@@ -40,6 +42,7 @@ struct ReconstructArguments {
   std::string grouping = "auto";
   std::string features = "sift";
   std::string match = "auto";
+  std::string frames = "auto";
   std::string stop_after = "texture";
   std::string poses;
   int max_features = FeatureOptions{}.max_keypoints;
@@ -53,6 +56,7 @@ Result<ReconstructionOptions> options_from(const ReconstructArguments& arguments
   ReconstructionOptions options;
   options.feature_kind =
       *feature_kind_from_string(arguments.features);  // CLI11 has checked the names
+  options.frames = *frame_use_from_string(arguments.frames);
   options.pair_mode = *pair_mode_from_string(arguments.match);
   options.grouping = *grouping_mode_from_string(arguments.grouping);
   options.features.max_keypoints = arguments.max_features;
@@ -160,6 +164,12 @@ void add_reconstruct_command(CLI::App& app, CommandContext& context) {
                     arguments->no_upsample,
                     "Do not look for features at twice the image size (SIFT, SURF): twice as fast, "
                     "poses somewhat less exact");
+  command
+      ->add_option("--frames",
+                   arguments->frames,
+                   "Which frames of a recording are used; auto: the keyframes of a video")
+      ->check(CLI::IsMember({"auto", "all", "keyframes"}))
+      ->capture_default_str();
   command->add_option("--match", arguments->match, "Which photographs are compared")
       ->check(CLI::IsMember({"auto", "sequential", "retrieval", "exhaustive"}))
       ->capture_default_str();

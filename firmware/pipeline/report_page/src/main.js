@@ -7,6 +7,7 @@ import { buildImageTable } from './image_table.js';
 import { buildMatchMatrix } from './match_matrix.js';
 import { buildCameras, buildCards, buildHeader, buildNotes, buildSettings } from './summary.js';
 import { buildDepthMaps, buildSurface } from './surface.js';
+import { buildTimeline } from './timeline.js';
 import { buildViewer } from './viewer/viewer.js';
 
 let problems = 0;
@@ -62,6 +63,7 @@ function build() {
       buildSurface(report),
       buildDepthMaps(report, depthMaps, select),
       buildPlots(report, tooltip),
+      buildTimeline(report, tooltip),
       buildImageTable(report, select),
       matrix?.element,
       buildCameras(report),

@@ -29,6 +29,8 @@ ReconstructionReport some_report() {
   report.images[2].map_inliers = 3;
   report.pairs = {{{ViewId{0}, ViewId{1}}, TwoViewKind::kPlanar, 20, 15},
                   {{ViewId{1}, ViewId{2}}, TwoViewKind::kNone, 4, 0}};
+  report.frames = {{"a.jpg", 0.0, FrameVerdict::kKept, {}},
+                   {"ab.jpg", 0.25, FrameVerdict::kTooLittleMotion, {.motion_deg = 0.5}}};
   report.cameras.resize(1);
   report.cameras[0].group = 1;
   report.cameras[0].origin = IntrinsicsOrigin::kPriorRefined;
@@ -50,10 +52,23 @@ TEST(ReportHistory, IsWhatTheReportWasMadeFrom) {
   EXPECT_EQ(history->pairs[0].kind, TwoViewKind::kPlanar);
   EXPECT_EQ(history->pairs[0].candidates, 20U);
   EXPECT_EQ(history->pairs[1].pair.second, ViewId{2});
+  ASSERT_EQ(history->frames.size(), 2U);
+  EXPECT_EQ(history->frames[1].name, "ab.jpg");
+  EXPECT_EQ(history->frames[1].time_s, 0.25);
+  EXPECT_EQ(history->frames[1].verdict, FrameVerdict::kTooLittleMotion);
+  EXPECT_EQ(history->frames[1].measures.motion_deg, 0.5);
   EXPECT_EQ(history->intrinsics_origins,
             (std::vector{IntrinsicsOrigin::kSolved, IntrinsicsOrigin::kPriorRefined}));
   ASSERT_EQ(history->settings.size(), 1U);
   EXPECT_EQ(history->settings[0].value, "7");
+}
+
+TEST(ReportHistory, MayHaveNoFrames) {
+  Json document = Json::parse(render_report_json(some_report()));
+  document.erase("frames");
+  const auto history = parse_report_history(document.dump());
+  ASSERT_TRUE(history) << history.error().message;
+  EXPECT_TRUE(history->frames.empty());
 }
 
 struct Damage {
@@ -89,6 +104,10 @@ INSTANTIATE_TEST_SUITE_P(
         Damage{"PairOutside", [](Json& json) { json["pairs"][0]["second"] = 3; }, "\"second\""},
         Damage{"PairBackwards", [](Json& json) { json["pairs"][1]["first"] = 2; }, "\"second\""},
         Damage{"UnknownKind", [](Json& json) { json["pairs"][0]["kind"] = ""; }, "\"kind\""},
+        Damage{"UnknownVerdict",
+               [](Json& json) { json["frames"][0]["verdict"] = "nice"; },
+               "\"verdict\""},
+        Damage{"NoTime", [](Json& json) { json["frames"][1].erase("time_s"); }, "\"time_s\""},
         Damage{"HugeGroup",
                [](Json& json) { json["cameras"][0]["group"] = 4'000'000'000U; },
                "\"group\""},
