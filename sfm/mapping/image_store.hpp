@@ -35,6 +35,8 @@ struct PoseAttempt {
   std::size_t map_matches = 0;
   std::size_t inliers = 0;
   RefusalReason reason = RefusalReason::kNone;  ///< kNone: not tried yet, or registered
+  /// Median angle under which the landmarks of its model were seen, when that was too small.
+  std::optional<double> model_parallax_deg{};
 };
 
 /// One image as the mapper knows it.

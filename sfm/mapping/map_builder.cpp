@@ -218,6 +218,7 @@ void MapBuilder::finish() {
     }
   }
   drop_unsupported_views();
+  drop_model_without_parallax();
   for (const LandmarkId id : map_.landmarks()) {
     double sum = 0.0;
     for (const Observation& observation : map_.landmark(id).track) {
@@ -250,12 +251,36 @@ void MapBuilder::drop_unsupported_views() {
     if (supported[index(view)] >= static_cast<std::size_t>(options_->min_supported_landmarks)) {
       continue;
     }
-    map_.unregister_view(view);
-    ImageRecord& image = store_->images[index(view)];
-    image.registered = false;
-    image.attempt.reason = RefusalReason::kNoParallax;
-    image.attempt.inliers = supported[index(view)];
+    drop_view(view, supported[index(view)]);
   }
+}
+
+void MapBuilder::drop_model_without_parallax() {
+  std::vector<double> angles_deg;
+  for (const LandmarkId id : map_.landmarks()) {
+    angles_deg.push_back(largest_triangulation_angle(map_, id) * 180.0 / std::numbers::pi);
+  }
+  if (angles_deg.empty()) {
+    return;
+  }
+  const auto middle = angles_deg.begin() + static_cast<std::ptrdiff_t>(angles_deg.size() / 2);
+  std::nth_element(angles_deg.begin(), middle, angles_deg.end());
+  if (*middle >= options_->min_model_parallax_deg) {
+    return;
+  }
+  const std::vector<ViewId> registered(map_.registered().begin(), map_.registered().end());
+  for (const ViewId view : registered) {
+    drop_view(view, 0);
+    store_->images[index(view)].attempt.model_parallax_deg = *middle;
+  }
+}
+
+void MapBuilder::drop_view(ViewId view, std::size_t supported_landmarks) {
+  map_.unregister_view(view);
+  ImageRecord& image = store_->images[index(view)];
+  image.registered = false;
+  image.attempt.reason = RefusalReason::kNoParallax;
+  image.attempt.inliers = supported_landmarks;
 }
 
 }  // namespace trigmesh

@@ -49,6 +49,8 @@ class MapBuilder {
   [[nodiscard]] bool try_register(ViewId view);
   void settle(ViewId view);
   void drop_unsupported_views();
+  void drop_model_without_parallax();
+  void drop_view(ViewId view, std::size_t supported_landmarks);
   [[nodiscard]] bool worth_trying(ViewId view) const;
   [[nodiscard]] ModelAdjustment adjustment() const;
 

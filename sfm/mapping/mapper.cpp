@@ -64,6 +64,9 @@ Result<> MapperOptions::validate() const {
   if (!(min_view_parallax_deg > 0.0 && min_view_parallax_deg <= 30.0)) {
     return refuse("min_view_parallax_deg", min_view_parallax_deg, "(0, 30]");
   }
+  if (!(min_model_parallax_deg > 0.0 && min_model_parallax_deg <= 30.0)) {
+    return refuse("min_model_parallax_deg", min_model_parallax_deg, "(0, 30]");
+  }
   if (!(global_growth_ratio > 1.0 && global_growth_ratio <= 10.0)) {
     return refuse("global_growth_ratio", global_growth_ratio, "(1, 10]");
   }

@@ -46,6 +46,9 @@ struct MapperOptions {
   /// supported, [6, 1000].
   int min_supported_landmarks = 15;
   double min_view_parallax_deg = 2.0;
+  /// A model of which half the landmarks are seen under less than this is none, degrees, (0, 30]:
+  /// when a camera turns on the spot, a rolling shutter and an unknown lens feign such depth.
+  double min_model_parallax_deg = 3.0;
   /// All adjustment of the whole model: after growth by this factor, (1, 10].
   double global_growth_ratio = 1.35;
   /// Landmarks kept per view in intermediate adjustments, [20, 100000]: they are chosen by track

@@ -63,10 +63,17 @@ ImageOutcome explain_refusal(const ImageStore& store, ViewId view, const MapperO
   } else if (image.attempt.reason == RefusalReason::kNoParallax) {
     outcome.reason = RefusalReason::kNoParallax;
     outcome.detail =
-        fmt::format("only {} of its points are seen under {:.1f} degrees or more, {} are needed",
-                    image.attempt.inliers,
-                    options.min_view_parallax_deg,
-                    options.min_supported_landmarks);
+        image.attempt.model_parallax_deg
+            ? fmt::format(
+                  "half of the points of its model are seen under {:.1f} degrees or less, "
+                  "{:.1f} are needed: the camera turned but hardly moved",
+                  *image.attempt.model_parallax_deg,
+                  options.min_model_parallax_deg)
+            : fmt::format(
+                  "only {} of its points are seen under {:.1f} degrees or more, {} are needed",
+                  image.attempt.inliers,
+                  options.min_view_parallax_deg,
+                  options.min_supported_landmarks);
   } else if (overlap.duplicate == overlap.verified) {
     outcome.reason = RefusalReason::kDuplicate;
     outcome.detail = "every image that it overlaps with is the same picture";

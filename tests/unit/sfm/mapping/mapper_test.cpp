@@ -181,6 +181,22 @@ TEST(Mapper, TooLittleParallaxGivesNoModelAndSaysWhy) {
   EXPECT_THAT(mapper.outcomes(), Each(Field(&ImageOutcome::reason, RefusalReason::kNoParallax)));
 }
 
+TEST(Mapper, AModelOfLittleParallaxAsAWholeIsNone) {
+  const SyntheticScene scene = make_synthetic_scene(
+      {.cloud = CloudKind::kVolume, .points = 300, .views = 5, .arc_deg = 20.0});
+  const Mapper good = map_scene(scene);
+  EXPECT_THAT(good.components(), SizeIs(1));
+  MapperOptions options;
+  options.min_model_parallax_deg = 29.0;
+  const Mapper mapper = map_scene(scene, IntrinsicsKnowledge::kGiven, options);
+  EXPECT_THAT(mapper.components(), IsEmpty());
+  EXPECT_EQ(mapper.registered_count(), 0U);
+  for (const ImageOutcome& outcome : mapper.outcomes()) {
+    EXPECT_EQ(outcome.reason, RefusalReason::kNoParallax);
+    EXPECT_THAT(outcome.detail, ::testing::HasSubstr("29.0 are needed"));
+  }
+}
+
 TEST(Mapper, NothingGivesNothing) {
   SerialExecutor executor;
   Mapper mapper = Mapper::create({}, executor).value();
@@ -347,6 +363,7 @@ TEST(MapperOptions, EveryFieldIsHeldToItsRangeAndNamed) {
   expect_refused("max_pose_error_px", [](auto& o) { o.max_pose_error_px = 101.0; });
   expect_refused("loss_scale_px", [](auto& o) { o.loss_scale_px = -1.0; });
   expect_refused("min_supported_landmarks", [](auto& o) { o.min_supported_landmarks = 5; });
+  expect_refused("min_model_parallax_deg", [](auto& o) { o.min_model_parallax_deg = 0.0; });
   expect_refused("min_view_parallax_deg", [=](auto& o) { o.min_view_parallax_deg = nan; });
   expect_refused("global_growth_ratio", [](auto& o) { o.global_growth_ratio = 1.0; });
   expect_refused("landmarks_per_view", [](auto& o) { o.landmarks_per_view = 19; });
