@@ -14,7 +14,7 @@ SEED = 4
 CUTS_OF_A_PHASE = 10
 # Longest time between two cuts, s: a capture takes a few seconds, a model some tens.
 LONGEST_GAP_S = {"capturing": 1.5, "working": 7.0}
-PATIENCE_S = 300
+PATIENCE_S = 600
 
 
 class Load:
