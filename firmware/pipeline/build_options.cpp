@@ -3,6 +3,8 @@
 #include <array>
 #include <bit>
 
+#include "firmware/pipeline/named_value.hpp"
+
 namespace trigmesh {
 
 namespace {
@@ -11,16 +13,6 @@ constexpr std::array kLastStages{
     LastStage::kSparse, LastStage::kDense, LastStage::kMesh, LastStage::kTexture};
 constexpr std::array kPresets{
     QualityPreset::kPreview, QualityPreset::kStandard, QualityPreset::kFine};
-
-template <typename Enum, std::size_t Count>
-std::optional<Enum> named(const std::array<Enum, Count>& values, std::string_view name) {
-  for (const Enum value : values) {
-    if (to_string(value) == name) {
-      return value;
-    }
-  }
-  return std::nullopt;
-}
 
 }  // namespace
 
@@ -39,7 +31,7 @@ std::string_view to_string(LastStage stage) {
 }
 
 std::optional<LastStage> last_stage_from_string(std::string_view name) {
-  return named(kLastStages, name);
+  return named_value(kLastStages, name);
 }
 
 std::string_view to_string(QualityPreset preset) {
@@ -55,7 +47,7 @@ std::string_view to_string(QualityPreset preset) {
 }
 
 std::optional<QualityPreset> quality_preset_from_string(std::string_view name) {
-  return named(kPresets, name);
+  return named_value(kPresets, name);
 }
 
 Result<> BuildOptions::validate() const {

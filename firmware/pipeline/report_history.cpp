@@ -2,12 +2,14 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <utility>
 
 #include <nlohmann/json.hpp>
 
 #include "firmware/base/check.hpp"
+#include "firmware/pipeline/named_value.hpp"
 #include "firmware/pipeline/report_json.hpp"
 
 namespace trigmesh {
@@ -69,10 +71,8 @@ Result<double> number_of(const Json& object, const char* name) {
 template <typename Enum>
 Result<Enum> one_of(const Json& object, const char* name, std::span<const Enum> values) {
   TM_ASSIGN_OR_RETURN(const std::string text, text_of(object, name));
-  for (const Enum value : values) {
-    if (to_string(value) == text) {
-      return value;
-    }
+  if (const std::optional<Enum> value = named_value(values, text)) {
+    return *value;
   }
   return bad_member(name, "has a value that is not known");
 }

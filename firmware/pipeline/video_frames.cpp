@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "firmware/base/check.hpp"
+#include "firmware/pipeline/named_value.hpp"
 #include "sfm/exchange/image_codec.hpp"
 
 namespace trigmesh {
@@ -130,12 +131,7 @@ std::string_view to_string(FrameUse use) {
 }
 
 std::optional<FrameUse> frame_use_from_string(std::string_view name) {
-  for (const FrameUse use : kFrameUses) {
-    if (to_string(use) == name) {
-      return use;
-    }
-  }
-  return std::nullopt;
+  return named_value(kFrameUses, name);
 }
 
 Result<bool> wants_keyframes(const PhotoSet& photos, FrameUse use) {
