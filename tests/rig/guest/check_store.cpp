@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -33,15 +34,18 @@ constexpr std::size_t kMostFileBytes = 256'000'000;
 struct Story {
   std::map<std::uint32_t, FrameKept> frames;  ///< kept and not discarded
   std::set<std::uint32_t> undone;
-  std::size_t presses = 0;
+  std::vector<std::chrono::nanoseconds> presses;  ///< kernel's times, ascending
   std::size_t releases = 0;
+  std::map<std::uint32_t, std::chrono::nanoseconds>
+      journaled;  ///< when a frame's record was written
   std::map<std::string, std::size_t> refusals;
   std::string states;  ///< in their order, joined by commas
 };
 
 class Checker {
  public:
-  explicit Checker(bool is_settled) : is_settled_(is_settled) {}
+  Checker(bool is_settled, bool takes_stills)
+      : is_settled_(is_settled), takes_stills_(takes_stills) {}
 
   void check_session(const fs::path& folder) {
     const std::string id = folder.filename().string();
@@ -64,6 +68,9 @@ class Checker {
     if (is_settled_) {
       check_settled(folder, *manifest, story);
     }
+    if (takes_stills_) {
+      check_stills(id, story);
+    }
     frame_counts_[id] = story.frames.size();
     undone_counts_[id] = story.undone.size();
     std::cout << fmt::format(
@@ -73,7 +80,7 @@ class Checker {
         dashed(to_string(manifest->state)),
         story.frames.size(),
         story.undone.size(),
-        story.presses,
+        story.presses.size(),
         story.releases,
         manifest->recoveries,
         model,
@@ -106,6 +113,26 @@ class Checker {
     std::cout << fmt::format("acknowledged: {} lines hold\n", lines);
   }
 
+  /// How long presses took to be stored; nothing without stills.
+  void tell_latencies() {
+    if (still_latencies_.empty()) {
+      return;
+    }
+    std::sort(still_latencies_.begin(), still_latencies_.end());
+    const auto at = [&](double share) {
+      const auto last = static_cast<double>(still_latencies_.size() - 1);
+      const auto place = static_cast<std::size_t>(share * last);
+      return std::chrono::duration<double, std::milli>(still_latencies_[place]).count();
+    };
+    std::cout << fmt::format(
+        "press to stored, ms, of {} stills: least {:.0f} median {:.0f} p90 {:.0f} most {:.0f}\n",
+        still_latencies_.size(),
+        at(0.0),
+        at(0.5),
+        at(0.9),
+        at(1.0));
+  }
+
   void complain(const std::string& what, const std::string& why) {
     std::cout << fmt::format("WRONG {}: {}\n", what, why);
     ++faults_;
@@ -126,6 +153,7 @@ class Checker {
     for (const JournalRecord& record : scan.records) {
       if (const auto* kept = std::get_if<FrameKept>(&record.entry)) {
         story.frames[kept->number] = *kept;
+        story.journaled[kept->number] = record.monotonic;
       } else if (const auto* refused = std::get_if<FrameRefused>(&record.entry)) {
         if (refused->reason == FrameRefusal::kUndone) {
           story.frames.erase(refused->number);
@@ -134,12 +162,37 @@ class Checker {
           ++story.refusals[std::string(to_string(refused->reason))];
         }
       } else if (const auto* edge = std::get_if<EdgeRecord>(&record.entry)) {
-        ++(edge->direction == EdgeDirection::kPress ? story.presses : story.releases);
+        if (edge->direction == EdgeDirection::kPress) {
+          story.presses.push_back(edge->kernel_time);
+        } else {
+          ++story.releases;
+        }
       } else if (const auto* change = std::get_if<StateChange>(&record.entry)) {
         story.states += (story.states.empty() ? "" : ",") + dashed(to_string(change->state));
       }
     }
+    std::sort(story.presses.begin(), story.presses.end());
     return story;
+  }
+
+  /// Of the press that a still was taken for to the writing of its record, when the frame was on
+  /// the disk. A frame whose exposure had ended before that press is a wrong one.
+  void check_stills(const std::string& id, const Story& story) {
+    for (const auto& [number, frame] : story.frames) {
+      const std::chrono::nanoseconds stored = story.journaled.at(number);
+      const auto later = std::upper_bound(story.presses.begin(), story.presses.end(), stored);
+      if (later == story.presses.begin()) {
+        complain(id, fmt::format("frame {} was stored before any press", number));
+        continue;
+      }
+      const std::chrono::nanoseconds press = *std::prev(later);
+      const std::chrono::nanoseconds exposure =
+          frame.metadata.exposure.value_or(std::chrono::nanoseconds::zero());
+      if (frame.metadata.timestamp + exposure / 2 < press) {
+        complain(id, fmt::format("frame {} was exposed before its press", number));
+      }
+      still_latencies_.push_back(stored - press);
+    }
   }
 
   void check_frames(const fs::path& folder, const Story& story) {
@@ -200,6 +253,8 @@ class Checker {
   }
 
   bool is_settled_;
+  bool takes_stills_;
+  std::vector<std::chrono::nanoseconds> still_latencies_;
   std::map<std::string, std::size_t> frame_counts_;
   std::map<std::string, std::size_t> undone_counts_;
   std::size_t faults_ = 0;
@@ -211,6 +266,7 @@ int main(int argc, char** argv) {
   fs::path root;
   fs::path acknowledged;
   bool is_settled = false;
+  bool takes_stills = false;
   CLI::App app(
       "One line for each session of a store, and a line with WRONG for each frame that is lost or\n"
       "changed, each broken journal and each half model. Exit code 1 when there is one.");
@@ -218,9 +274,12 @@ int main(int argc, char** argv) {
   app.add_option("--acknowledged", acknowledged, "lines 'SESSION FRAMES' that were acknowledged")
       ->check(CLI::ExistingFile);
   app.add_flag("--settled", is_settled, "nothing is being captured or made: nothing is left over");
+  app.add_flag("--stills",
+               takes_stills,
+               "every frame was taken for a press: none is older, and how long each took");
   CLI11_PARSE(app, argc, argv);
   std::vector<fs::path> folders;
-  Checker checker(is_settled);
+  Checker checker(is_settled, takes_stills);
   for (const fs::directory_entry& entry : fs::directory_iterator(root)) {
     const std::string name = entry.path().filename().string();
     if (entry.is_directory() && !is_hidden_name(name) && name != "lost+found") {
@@ -236,5 +295,6 @@ int main(int argc, char** argv) {
   if (!acknowledged.empty()) {
     checker.check_acknowledged(acknowledged);
   }
+  checker.tell_latencies();
   return checker.faults() == 0 ? 0 : 1;
 }
