@@ -45,6 +45,20 @@ void answer_done(httplib::Response& response, const Result<>& done) {
   answer(response, done.map([] { return std::string("{}"); }));
 }
 
+/// The library waits for a body that was not announced until its time-out.
+httplib::Server::HandlerResponse refuse_unknown_length(const httplib::Request& request,
+                                                       httplib::Response& response) {
+  constexpr int kLengthRequired = 411;
+  if (request.method != "POST" || request.has_header("Content-Length") ||
+      request.has_header("Transfer-Encoding")) {
+    return httplib::Server::HandlerResponse::Unhandled;
+  }
+  answer_error(response,
+               kLengthRequired,
+               "a POST must say how long its body is, also when it has none (curl: --data '')");
+  return httplib::Server::HandlerResponse::Handled;
+}
+
 std::string sse_text(const ControlEvent& event) {
   return fmt::format("id: {}\nevent: {}\ndata: {}\n\n", event.number, event.kind, event.data);
 }
@@ -87,6 +101,7 @@ class ControlServer::Impl {
     // One request a connection: a thread is not held by a client that does nothing.
     server_.set_keep_alive_max_count(1);
     server_.set_read_timeout(std::chrono::seconds(5));
+    server_.set_pre_routing_handler(refuse_unknown_length);
     add_routes();
   }
 

@@ -1,12 +1,17 @@
+#include <array>
+#include <filesystem>
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include <httplib.h>
 #include <sys/socket.h>
+#include <sys/un.h>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "firmware/base/unique_fd.hpp"
 #include "firmware/control/control_server.hpp"
 #include "tests/integration/fake_rig.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -20,6 +25,25 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 constexpr const char* kJson = "application/json";
+
+/// What the rig answers to the bytes of a request, until it closes the connection.
+std::string answer_to(const std::filesystem::path& socket_path, std::string_view request) {
+  sockaddr_un address{.sun_family = AF_UNIX, .sun_path = {}};
+  socket_path.native().copy(address.sun_path, sizeof(address.sun_path) - 1);
+  const UniqueFd connection(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  if (::connect(connection.get(), reinterpret_cast<const sockaddr*>(&address), sizeof(address)) !=
+          0 ||
+      ::send(connection.get(), request.data(), request.size(), MSG_NOSIGNAL) !=
+          static_cast<ssize_t>(request.size())) {
+    return {};
+  }
+  std::string answer;
+  std::array<char, 512> part{};
+  for (ssize_t count = 0; (count = ::recv(connection.get(), part.data(), part.size(), 0)) > 0;) {
+    answer.append(part.data(), static_cast<std::size_t>(count));
+  }
+  return answer;
+}
 
 class Control : public ::testing::Test {
  protected:
@@ -102,6 +126,14 @@ TEST_F(Control, RefusesWhatIsUnknownOrTooLarge) {
   const std::string body(options_.max_body_bytes + 1, 'x');
   const auto refused = client()->Post("/v1/still", body, "text/plain");
   EXPECT_TRUE(!refused || refused->status == 413);
+  EXPECT_THAT(served_.rig().asked(), IsEmpty());
+}
+
+TEST_F(Control, RefusesAPostOfUnknownLengthInsteadOfWaitingForItsBody) {
+  const std::string answer =
+      answer_to(options_.socket_path, "POST /v1/still HTTP/1.1\r\nHost: rig\r\n\r\n");
+  EXPECT_THAT(answer, HasSubstr(" 411 "));
+  EXPECT_THAT(answer, HasSubstr("--data ''"));
   EXPECT_THAT(served_.rig().asked(), IsEmpty());
 }
 
