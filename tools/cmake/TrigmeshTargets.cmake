@@ -66,15 +66,6 @@ add_custom_target(trigmesh_unit_tests)
 add_custom_target(trigmesh_thread_tests)
 add_custom_target(trigmesh_fuzzers)
 
-# Tests are large and quick: little optimisation takes a third less time to compile, none under sanitizers half.
-function(trigmesh_compile_quickly target)
-  if(TRIGMESH_SANITIZE)
-    target_compile_options(${target} PRIVATE -O0)
-  elseif(CMAKE_BUILD_TYPE STREQUAL Release)
-    target_compile_options(${target} PRIVATE -O1)
-  endif()
-endfunction()
-
 # trigmesh_add_test(NAME unit_sfm_camera SOURCES .. LIBRARIES .. LABEL unit [TIMEOUT 60])
 # A GoogleTest program; every TEST in it becomes a ctest entry with the label and time-out.
 function(trigmesh_add_test)
@@ -87,7 +78,6 @@ function(trigmesh_add_test)
   endif()
   add_executable(${ARG_NAME} ${ARG_SOURCES})
   target_link_libraries(${ARG_NAME} PRIVATE ${ARG_LIBRARIES} trigmesh_tests_framework)
-  trigmesh_compile_quickly(${ARG_NAME})
   target_precompile_headers(${ARG_NAME} REUSE_FROM trigmesh_tests_headers)
   if("${ARG_LABEL}" MATCHES "^(unit|conformance)$")
     add_dependencies(trigmesh_unit_tests ${ARG_NAME})
