@@ -183,6 +183,7 @@ TEST_F(Still, ASessionWithoutFramesGoes) {
 TEST_F(Still, RefusesAPressWithoutACamera) {
   camera_->is_plugged = false;
   start_daemon();
+  await_that([&] { return !status().fault.empty(); });  // else it was not tried yet
   press_and_release();
   await("pressrefused", "no camera");
   EXPECT_EQ(control().still().error().code, ErrorCode::kInsufficientData);
