@@ -1,51 +1,19 @@
 #include "firmware/pipeline/matching_stage.hpp"
 
 #include <algorithm>
-#include <limits>
 
 #include <fmt/format.h>
 
 #include "firmware/base/binary_stream.hpp"
 #include "firmware/base/check.hpp"
-#include "sfm/matching/pair_matching.hpp"
+#include "firmware/pipeline/matchable_image.hpp"
+#include "firmware/pipeline/sequence_matching.hpp"
 
 namespace trigmesh {
 
 namespace {
 
 constexpr const char* kCheckpoint = "pairs";
-
-/// Pixels as a lens without distortion would give them; a keypoint without a ray becomes
-/// not-a-number, which no match survives.
-std::vector<Eigen::Vector2d> undistort(const Camera& camera,
-                                       const std::vector<Keypoint>& keypoints) {
-  Camera ideal = camera;
-  ideal.model = CameraModel::kPinhole;
-  std::vector<Eigen::Vector2d> result;
-  result.reserve(keypoints.size());
-  for (const Keypoint& keypoint : keypoints) {
-    const Eigen::Vector2d pixel(static_cast<double>(keypoint.x_px),
-                                static_cast<double>(keypoint.y_px));
-    const auto ray = normalize_pixel(camera, pixel);
-    const auto straight = ray ? project(ideal, ray->homogeneous()) : std::nullopt;
-    result.push_back(
-        straight.value_or(Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN())));
-  }
-  return result;
-}
-
-Result<MatchableImage> prepare(const ImageFeatures& image, const CameraGroup& group) {
-  TM_ASSIGN_OR_RETURN(DescriptorIndex index, DescriptorIndex::build(image.features));
-  MatchableImage result{std::move(index),
-                        undistort(group.camera, image.features.keypoints),
-                        image.width_px,
-                        image.height_px,
-                        std::nullopt};
-  if (group.knowledge != IntrinsicsKnowledge::kUnknown) {
-    result.calibration = group.camera.calibration_matrix();
-  }
-  return result;
-}
 
 std::uint64_t key_of(const std::vector<ExtractedImage>& images,
                      const CameraGroups& cameras,
@@ -75,7 +43,7 @@ Result<std::vector<MatchableImage>> prepare_all(const std::vector<ExtractedImage
   for (std::size_t i = 0; i < images.size(); ++i) {
     const CameraGroup& group = cameras.groups[index(cameras.group_of_image[i])];
     TM_ASSIGN_OR_RETURN(MatchableImage image,
-                        prepare(images[i].features ? *images[i].features : nothing, group));
+                        matchable_image(images[i].features ? *images[i].features : nothing, group));
     result.push_back(std::move(image));
   }
   return result;
@@ -127,7 +95,7 @@ Result<std::vector<PairRecord>> decode_pairs(std::span<const std::uint8_t> bytes
     record.geometry.candidates = static_cast<std::size_t>(in.value<std::uint64_t>());
     record.geometry.homography_inliers = static_cast<std::size_t>(in.value<std::uint64_t>());
     record.geometry.inliers = in.items<FeatureMatch>();
-    if (kind > static_cast<std::uint32_t>(TwoViewKind::kDuplicate)) {
+    if (kind > static_cast<std::uint32_t>(TwoViewKind::kLookAlike)) {
       return fail(ErrorCode::kCorruptData, "cannot read stored pairs: unknown kind {}", kind);
     }
     record.geometry.kind = static_cast<TwoViewKind>(kind);
@@ -170,6 +138,32 @@ Result<std::vector<PairRecord>> match_photos(const std::vector<ExtractedImage>& 
   }
   std::erase_if(pairs, [](const PairRecord& record) { return record.geometry.candidates == 0; });
   TM_RETURN_IF_ERROR(context.checkpoints.save(kCheckpoint, key, encode_pairs(pairs)));
+  return pairs;
+}
+
+Result<std::vector<PairRecord>> match_walk(const std::vector<ExtractedImage>& images,
+                                           const CameraGroups& cameras,
+                                           const MapperOptions& mapper,
+                                           const StageContext& context) {
+  SequenceMatchingOptions options;
+  options.mapper = mapper;
+  TM_ASSIGN_OR_RETURN(auto matcher,
+                      SequenceMatcher::create(options, context.executor, context.checkpoints));
+  StageProgress progress(context, Stage::kMatch, images.size());
+  std::vector<PairRecord> pairs;
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    if (context.stop.stop_requested()) {
+      return fail(ErrorCode::kCancelled, "stopped while matching; finished keyframes are kept");
+    }
+    const CameraId camera = cameras.group_of_image[i];
+    TM_ASSIGN_OR_RETURN(const auto found,
+                        matcher.add(images[i], cameras.groups[index(camera)], camera));
+    pairs.insert(pairs.end(), found.begin(), found.end());
+    progress.advance();
+  }
+  std::sort(pairs.begin(), pairs.end(), [](const PairRecord& a, const PairRecord& b) {
+    return a.pair < b.pair;
+  });
   return pairs;
 }
 

@@ -27,6 +27,13 @@ struct MatchingStageOptions {
     const MatchingStageOptions& options,
     const StageContext& context);
 
+/// The same for the keyframes of a walk, in their order: see SequenceMatcher. Each keyframe is a
+/// checkpoint, which does not depend on those after it.
+[[nodiscard]] Result<std::vector<PairRecord>> match_walk(const std::vector<ExtractedImage>& images,
+                                                         const CameraGroups& cameras,
+                                                         const MapperOptions& mapper,
+                                                         const StageContext& context);
+
 /// Bytes for a checkpoint and back. Decoding anything else gives kCorruptData.
 [[nodiscard]] std::vector<std::uint8_t> encode_pairs(const std::vector<PairRecord>& pairs);
 [[nodiscard]] Result<std::vector<PairRecord>> decode_pairs(std::span<const std::uint8_t> bytes);

@@ -20,6 +20,8 @@ namespace trigmesh {
 struct PhotoSet {
   std::vector<std::string> names;  ///< unique, in input order
   bool ordered = false;            ///< neighbours in the list are neighbours in time
+  /// They are keyframes of a walk, chosen so that neighbours overlap.
+  bool is_walk = false;
   /// When each was taken, rising, for the frames of a video from which keyframes may be chosen;
   /// empty: every photograph is wanted.
   std::vector<std::chrono::nanoseconds> timestamps{};

@@ -249,13 +249,34 @@ Result<PhotoFeatures> extract(const Run& run, const MemoryPlan& plan) {
   return PhotoFeatures{std::move(images), std::move(cameras)};
 }
 
+MapperOptions mapper_options(const ReconstructionOptions& options) {
+  MapperOptions mapper = options.mapper;
+  mapper.seed = options.seed;
+  return mapper;
+}
+
+Result<std::vector<PairRecord>> match(const Run& run,
+                                      const PhotoFeatures& features,
+                                      const StageContext& context) {
+  const ReconstructionOptions& options = run.options;
+  const bool follows_walk =
+      run.photos.is_walk && options.pair_mode == PairMode::kAuto && !options.poses;
+  auto pairs = follows_walk
+                   ? match_walk(features.images, features.cameras, mapper_options(options), context)
+                   : match_photos(features.images,
+                                  features.cameras,
+                                  {options.pair_mode, run.photos.ordered, options.seed},
+                                  context);
+  run.stopwatch.finish(Stage::kMatch);
+  return pairs;
+}
+
 Result<MappedPhotos> map_features(const Run& run,
                                   const PhotoFeatures& features,
                                   const std::vector<PairRecord>& pairs,
                                   const StageContext& context) {
   const auto& [images, cameras] = features;
-  MapperOptions mapper = run.options.mapper;
-  mapper.seed = run.options.seed;
+  const MapperOptions mapper = mapper_options(run.options);
   auto mapped = run.options.poses
                     ? map_known_poses(
                           run.photos, images, cameras, pairs, {*run.options.poses, mapper}, context)
@@ -270,12 +291,7 @@ Result<ReconstructionSummary> run_stages(const Run& run) {
   WorkerPool pool(options.num_threads, run.stop, &run.listener);
   const StageContext context{pool, run.checkpoints, run.listener, run.stop};
   TM_ASSIGN_OR_RETURN(const PhotoFeatures features, extract(run, plan));
-  TM_ASSIGN_OR_RETURN(const auto pairs,
-                      match_photos(features.images,
-                                   features.cameras,
-                                   {options.pair_mode, run.photos.ordered, options.seed},
-                                   context));
-  run.stopwatch.finish(Stage::kMatch);
+  TM_ASSIGN_OR_RETURN(const auto pairs, match(run, features, context));
   TM_ASSIGN_OR_RETURN(const MappedPhotos mapped, map_features(run, features, pairs, context));
 
   run.listener.on_progress({Stage::kWrite, 0, 1});

@@ -26,6 +26,7 @@ constexpr std::array kTwoViewKinds{
     TwoViewKind::kPureRotation,
     TwoViewKind::kWatermark,
     TwoViewKind::kDuplicate,
+    TwoViewKind::kLookAlike,
 };
 constexpr std::array kVerdicts{
     FrameVerdict::kKept,

@@ -79,6 +79,7 @@ class VideoReader {
       }
     }
     result.photos = subset(photos_, kept);
+    result.photos.is_walk = true;
     result.photos.description = fmt::format(
         "{}, {} of {} frames kept", photos_.description, kept.size(), photos_.names.size());
     return result;

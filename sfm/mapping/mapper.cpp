@@ -6,6 +6,7 @@
 #include "firmware/base/check.hpp"
 #include "sfm/mapping/focal_vote.hpp"
 #include "sfm/mapping/image_store.hpp"
+#include "sfm/mapping/loop_check.hpp"
 #include "sfm/mapping/map_builder.hpp"
 #include "sfm/mapping/map_joining.hpp"
 #include "sfm/mapping/refusal.hpp"
@@ -137,7 +138,7 @@ void Mapper::add_pair(ImagePair pair, const TwoViewGeometry& geometry) {
   store.images[index(pair.second)].pairs.push_back(store.pairs.size());
   store.pairs.push_back({pair, geometry});
   state_->additions = true;
-  if (geometry.kind == TwoViewKind::kNone || geometry.kind == TwoViewKind::kWatermark) {
+  if (!shows_one_scene(geometry.kind)) {
     return;
   }
   const std::vector<TrackId> gone = store.tracks.add_matches(pair, geometry.inliers);
@@ -218,6 +219,31 @@ StepReport Mapper::step() {
     }
   }
   return state_->seed_map();
+}
+
+std::size_t Mapper::track() {
+  state_->follow_additions();
+  std::size_t registered = 0;
+  for (const auto& map : state_->maps) {
+    while (map->register_next()) {
+      ++registered;
+    }
+  }
+  return registered;
+}
+
+bool Mapper::is_registered(ViewId view) const {
+  return state_->store.images[index(view)].registered;
+}
+
+std::optional<double> Mapper::disagreement_deg(ImagePair pair,
+                                               std::span<const FeatureMatch> matches) const {
+  for (const auto& map : state_->maps) {
+    if (map->map().is_registered(pair.first) && map->map().is_registered(pair.second)) {
+      return trigmesh::disagreement_deg(map->map(), pair, matches);
+    }
+  }
+  return std::nullopt;
 }
 
 void Mapper::State::join_maps() {

@@ -117,6 +117,17 @@ class Mapper {
   /// Registers the next best view, or starts a model, or reports that neither can be done now.
   StepReport step();
 
+  /// Registers what fits the models as they are: no refinement of a whole model, no new one. For
+  /// frames that come one after the other; cheap. Returns how many views were registered.
+  std::size_t track();
+
+  [[nodiscard]] bool is_registered(ViewId view) const;
+
+  /// How far the matches of a pair lie from where the model that has both its views expects them:
+  /// see disagreement_deg() of loop_check. Nothing when no model has both, or it cannot tell.
+  [[nodiscard]] std::optional<double> disagreement_deg(ImagePair pair,
+                                                       std::span<const FeatureMatch> matches) const;
+
   /// Adjusts everything with all landmarks, drops what parallax does not support, joins components.
   void finish();
 

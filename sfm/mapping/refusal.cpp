@@ -27,7 +27,7 @@ OverlapCounts count_overlap(const ImageStore& store, const ImageRecord& image) {
   for (const std::size_t position : image.pairs) {
     const TwoViewGeometry& geometry = store.pairs[position].geometry;
     counts.candidates = std::max(counts.candidates, geometry.candidates);
-    if (geometry.kind == TwoViewKind::kNone || geometry.kind == TwoViewKind::kWatermark) {
+    if (!shows_one_scene(geometry.kind)) {
       continue;
     }
     ++counts.verified;

@@ -16,8 +16,15 @@ std::string_view to_string(TwoViewKind kind) {
       return "watermark";
     case TwoViewKind::kDuplicate:
       return "duplicate";
+    case TwoViewKind::kLookAlike:
+      return "look_alike";
   }
   return "none";
+}
+
+bool shows_one_scene(TwoViewKind kind) {
+  return kind != TwoViewKind::kNone && kind != TwoViewKind::kWatermark &&
+         kind != TwoViewKind::kLookAlike;
 }
 
 }  // namespace trigmesh

@@ -26,10 +26,14 @@ enum class TwoViewKind {
   kPureRotation,  ///< the camera turned on the spot (homography K R K^-1): no parallax
   kWatermark,     ///< matches stand at the same pixels near the border: an overlay, not the scene
   kDuplicate,     ///< the same picture twice (identity within a fraction of a pixel)
+  kLookAlike,     ///< another place that looks alike: contradicts the frames in between
 };
 
-/// "none", "general", "planar", "pure_rotation", "watermark", "duplicate".
+/// "none", "general", "planar", "pure_rotation", "watermark", "duplicate", "look_alike".
 [[nodiscard]] std::string_view to_string(TwoViewKind kind);
+
+/// Whether the matches of such a pair are points of one scene.
+[[nodiscard]] bool shows_one_scene(TwoViewKind kind);
 
 /// A verified image pair.
 struct TwoViewGeometry {
