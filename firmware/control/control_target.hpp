@@ -19,6 +19,7 @@ struct ControlStatus {
   StorageLevel storage = StorageLevel::kOk;
   std::string session_id;    ///< of the open session; empty: none
   std::uint32_t frames = 0;  ///< kept in it
+  std::string advice;        ///< what the operator should do now, one sentence; empty: go on
   JobState job = JobState::kNone;
   std::uint32_t queued_models = 0;    ///< closed sessions that wait for their model
   std::uint64_t available_bytes = 0;  ///< that may still be captured

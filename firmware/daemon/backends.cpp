@@ -193,8 +193,8 @@ std::unique_ptr<ModelMaker> make_model_worker(const Settings& settings,
   return std::make_unique<ModelWorker>(
       model_worker_options(settings.reconstruction, TRIGMESH_VERSION),
       clock,
-      std::move(observer.on_answer),
-      std::move(on_progress));
+      ModelListeners{
+          std::move(observer.on_answer), std::move(on_progress), std::move(observer.on_followed)});
 }
 
 }  // namespace

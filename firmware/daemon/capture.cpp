@@ -5,6 +5,9 @@
 
 #include <fmt/format.h>
 
+#include "firmware/daemon/keyframe_stream.hpp"
+#include "firmware/daemon/sharpest_of_group.hpp"
+
 namespace trigmesh {
 namespace {
 
@@ -18,13 +21,19 @@ constexpr std::uint64_t kMostDamaged = 30;
 
 std::string note_of(const StreamCounts& counts) {
   return fmt::format(
-      "stream ended: {} frames seen, {} kept, {} less sharp than a neighbour, {} damaged, {} "
-      "without a buffer",
+      "stream ended: {} frames seen, {} kept, {} not chosen, {} damaged, {} without a buffer",
       counts.seen,
       counts.kept,
-      counts.less_sharp,
+      counts.not_chosen,
       counts.damaged,
       counts.no_buffer);
+}
+
+std::unique_ptr<StreamSelector> make_selector(const CaptureOptions& options, FrameCopies& copies) {
+  if (options.group_size == 0) {
+    return std::make_unique<KeyframeStream>(options.keyframes, copies);
+  }
+  return std::make_unique<SharpestOfGroup>(options.group_size, copies);
 }
 
 }  // namespace
@@ -33,7 +42,7 @@ Capture::Capture(const CaptureOptions& options, const CaptureParts& parts)
     : options_(options),
       parts_(parts),
       shelf_(options.stills, parts.copies),
-      stream_(options.group_size, parts.copies),
+      stream_(make_selector(options, parts.copies)),
       hold_(options.hold),
       interval_(options.frame_interval) {}
 
@@ -156,12 +165,41 @@ void Capture::use_frame(const Frame& frame) {
   if (!shelf_.offer(frame, times, sequence)) {
     ++parts_.drops.queue;
   }
-  if (stream_.is_streaming()) {
-    const std::uint64_t without_buffer = stream_.counts().no_buffer;
-    if (auto kept = stream_.offer(frame, times, sequence)) {
-      parts_.storage.push(StreamFrameOrder{session_, *std::move(kept)});
-    }
-    parts_.drops.queue += stream_.counts().no_buffer - without_buffer;
+  if (stream_->is_streaming()) {
+    offer_to_stream(frame, times, sequence);
+  } else {
+    hold_before_press(frame, times, sequence);
+  }
+}
+
+void Capture::offer_to_stream(const Frame& frame, const FrameTimes& times, std::uint64_t sequence) {
+  const std::uint64_t without_buffer = stream_->counts().no_buffer;
+  hand_out(stream_->offer(frame, times, sequence));
+  parts_.drops.queue += stream_->counts().no_buffer - without_buffer;
+}
+
+void Capture::hand_out(StreamChoice choice) {
+  for (TimedFrame& kept : choice.kept) {
+    parts_.storage.push(StreamFrameOrder{session_, std::move(kept)});
+  }
+  if (!choice.judged.empty()) {
+    (void)parts_.rig.push(FramesSeen{session_, choice.judged});
+    parts_.storage.push(RecordOrder{session_, FramesJudged{std::move(choice.judged)}});
+  }
+}
+
+/// The oldest goes first, so that its buffer can take the newest.
+void Capture::hold_before_press(const Frame& frame,
+                                const FrameTimes& times,
+                                std::uint64_t sequence) {
+  if (options_.pre_trigger_frames == 0) {
+    return;
+  }
+  while (before_press_.size() >= options_.pre_trigger_frames) {
+    before_press_.pop_front();
+  }
+  if (Frame copy = parts_.copies.copy(frame, sequence); !copy.empty()) {
+    before_press_.push_back({std::move(copy), times, sequence});
   }
 }
 
@@ -205,15 +243,18 @@ void Capture::do_orders() {
 
 void Capture::do_order(const BeginStream& order) {
   session_ = order.serial;
-  stream_.begin(order.from);
+  stream_->begin(order.from);
+  while (!before_press_.empty()) {
+    const TimedFrame held = std::move(before_press_.front());
+    before_press_.pop_front();
+    offer_to_stream(held.frame, held.times, held.sequence);
+  }
 }
 
 void Capture::do_order(const EndStream& order) {
   tell(hold_.check(controls()));
-  if (auto kept = stream_.end()) {
-    parts_.storage.push(StreamFrameOrder{order.serial, *std::move(kept)});
-  }
-  parts_.storage.push(StreamDoneOrder{order.serial, note_of(stream_.counts())});
+  hand_out(stream_->end());
+  parts_.storage.push(StreamDoneOrder{order.serial, note_of(stream_->counts())});
 }
 
 void Capture::do_order(const HoldCamera& order) {

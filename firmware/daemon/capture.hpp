@@ -3,7 +3,9 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -20,12 +22,17 @@
 #include "firmware/daemon/still_shelf.hpp"
 #include "firmware/daemon/storage_inbox.hpp"
 #include "firmware/daemon/stream_selector.hpp"
+#include "sfm/keyframes/keyframe_selector.hpp"
 
 namespace trigmesh {
 
 struct CaptureOptions {
   StillShelfOptions stills;
-  std::size_t group_size = 5;  ///< of a stream, one of so many frames is kept
+  std::size_t group_size = 0;  ///< of a stream, one of so many frames is kept; 0: its keyframes
+  KeyframeOptions keyframes;
+  /// Frames before a stream that are held, because the press is heard of late: those that were
+  /// exposed after it belong to the stream.
+  std::size_t pre_trigger_frames = 0;
   CameraHoldOptions hold;
   /// Between two frames, where the camera does not tell. > 0.
   std::chrono::nanoseconds frame_interval = std::chrono::milliseconds(33);
@@ -90,6 +97,9 @@ class Capture {
   void do_order(const ReleaseCamera& order);
 
   void hand_out_stills();
+  void offer_to_stream(const Frame& frame, const FrameTimes& times, std::uint64_t sequence);
+  void hand_out(StreamChoice choice);
+  void hold_before_press(const Frame& frame, const FrameTimes& times, std::uint64_t sequence);
   void check_hold();
   void tell(const std::vector<std::string>& sentences);
   [[nodiscard]] CameraControls* controls();
@@ -98,7 +108,8 @@ class Capture {
   CaptureOptions options_;
   CaptureParts parts_;
   StillShelf shelf_;
-  StreamSelector stream_;
+  std::unique_ptr<StreamSelector> stream_;
+  std::deque<TimedFrame> before_press_;
   CameraHold hold_;
   Retries retries_;
   SessionSerial session_{};  ///< that began last

@@ -114,6 +114,7 @@ ModelObserver Daemon::observer() {
     (void)rig_queue_.push(std::move(answer));
   };
   observer.on_progress = [this](const ProgressEvent& event) { tell_progress(event); };
+  observer.on_followed = [this](const MapFollowed& map) { (void)rig_queue_.push(map); };
   return observer;
 }
 

@@ -16,10 +16,11 @@
 
 namespace trigmesh {
 
-/// What a maker of models tells; both functions are thread-safe.
+/// What a maker of models tells; all functions are thread-safe.
 struct ModelObserver {
   std::function<void(ModelAnswer)> on_answer;
   std::function<void(const ProgressEvent&)> on_progress;
+  std::function<void(const MapFollowed&)> on_followed;
 };
 
 /// The devices of the rig and what stands around it, chosen by the composition root (or a test).

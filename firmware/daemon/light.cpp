@@ -11,9 +11,26 @@ using std::chrono::nanoseconds;
 /// How long the thread waits before it shows that it lives, and tries a light that failed again.
 constexpr std::chrono::milliseconds kTurn(500);
 
+/// While frames are captured.
+IndicatorPattern pattern_of(Advice advice) {
+  switch (advice) {
+    case Advice::kGoBack:
+      return IndicatorPattern::kLost;
+    case Advice::kMoreLight:
+    case Advice::kSlower:
+    case Advice::kHoldSteady:
+    case Advice::kStepSideways:
+      return IndicatorPattern::kSlower;
+    case Advice::kEnough:
+    case Advice::kNone:
+      break;
+  }
+  return IndicatorPattern::kCapturing;
+}
+
 }  // namespace
 
-IndicatorPattern pattern_of(const RigState& state, LastOutcome outcome) {
+IndicatorPattern pattern_of(const RigState& state, LastOutcome outcome, Advice advice) {
   if (phase_of(state) == RigPhase::kFault) {
     return IndicatorPattern::kFailed;
   }
@@ -22,7 +39,7 @@ IndicatorPattern pattern_of(const RigState& state, LastOutcome outcome) {
   }
   switch (phase_of(state)) {
     case RigPhase::kCapturing:
-      return IndicatorPattern::kCapturing;
+      return pattern_of(advice);
     case RigPhase::kWorking:
       return IndicatorPattern::kWorking;
     case RigPhase::kIdle:

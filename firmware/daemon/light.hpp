@@ -10,6 +10,7 @@
 
 #include "drivers/indicator/indicator.hpp"
 #include "firmware/base/clock.hpp"
+#include "firmware/daemon/guide.hpp"
 #include "firmware/daemon/heartbeat.hpp"
 #include "firmware/daemon/logging.hpp"
 #include "firmware/session/state_machine.hpp"
@@ -20,7 +21,9 @@ namespace trigmesh {
 enum class LastOutcome : std::uint8_t { kNone, kDone, kFailed };
 
 /// What the light says; see the table in the README.
-[[nodiscard]] IndicatorPattern pattern_of(const RigState& state, LastOutcome outcome);
+[[nodiscard]] IndicatorPattern pattern_of(const RigState& state,
+                                          LastOutcome outcome,
+                                          Advice advice = Advice::kNone);
 
 /// Opens the light; called again and again until it succeeds.
 using IndicatorOpener = std::function<DeviceResult<std::unique_ptr<Indicator>>()>;

@@ -1,7 +1,10 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <string>
+#include <variant>
 
 #include "firmware/session/session.hpp"
 
@@ -22,6 +25,37 @@ struct ModelAnswer {
   std::string message;  ///< one sentence for people
 };
 
+// What a maker of models hears of a capture that goes on, in this order: begin, frames and
+// discarded frames, end.
+
+struct CaptureBegan {
+  std::string session_id;
+  std::filesystem::path work_folder;
+  std::string camera_profile;  ///< as in the manifest
+};
+
+/// A frame of a video is stored for good.
+struct CaptureFrame {
+  std::uint32_t number = 0;
+  std::filesystem::path file;
+};
+
+/// The last frame was discarded.
+struct CaptureUndone {};
+
+struct CaptureEnded {};
+
+using CaptureNews = std::variant<CaptureBegan, CaptureFrame, CaptureUndone, CaptureEnded>;
+
+/// What the map says of a frame.
+struct MapFollowed {
+  std::string session_id;
+  FrameMapped frame;
+  std::size_t photographs = 0;  ///< mapped so far
+  std::size_t tracked = 0;      ///< of these, with a pose
+  bool closes_loop = false;     ///< it shows what was seen long before
+};
+
 /// Makes the model of one closed session at a time, in the background. The answer comes once for
 /// each begin(), by a function given when it is made, on a thread of its own. Thread-compatible.
 class ModelMaker {
@@ -36,6 +70,9 @@ class ModelMaker {
   /// Begins, or goes on from the stages that are finished. It sets the states of the session, whose
   /// last state stays what it was when it is cancelled. Precondition: every begin() was answered.
   virtual void begin(Session session) = 0;
+
+  /// News of a capture. Returns at once; whoever does not map while it is captured need not listen.
+  virtual void follow(CaptureNews news) { (void)news; }
 
   /// Asks it to stop soon: answered by kCancelled, or by what came first. Nothing when idle.
   virtual void request_stop() = 0;

@@ -6,61 +6,17 @@
 #include <utility>
 
 #include <malloc.h>
-#include <pthread.h>
-#include <signal.h>
-#include <sys/resource.h>
-#include <unistd.h>
 
 #include <fmt/format.h>
 
 #include "firmware/base/check.hpp"
+#include "firmware/daemon/background_thread.hpp"
 #include "firmware/daemon/session_model_place.hpp"
 #include "firmware/photos/photo_input.hpp"
-#include "sfm/exchange/camera_profile.hpp"
+#include "firmware/photos/session_options.hpp"
 
 namespace trigmesh {
 namespace {
-
-constexpr std::uint64_t kMegabyte = 1'000'000;
-
-QualityPreset preset_of(ReconstructionSettings::Preset preset) {
-  switch (preset) {
-    case ReconstructionSettings::Preset::kPreview:
-      return QualityPreset::kPreview;
-    case ReconstructionSettings::Preset::kStandard:
-      return QualityPreset::kStandard;
-    case ReconstructionSettings::Preset::kFine:
-      break;
-  }
-  return QualityPreset::kFine;
-}
-
-int thread_count(int wanted) {
-  constexpr int kMostThreads = 256;
-  if (wanted > 0) {
-    return wanted;
-  }
-  return std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, kMostThreads);
-}
-
-/// The calling thread, and those that it will start.
-void lower_priority(int nice) {
-  pthread_setname_np(pthread_self(), "tm-model");
-  // Linux keeps the niceness per thread. Raising it is always allowed.
-  (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), nice);
-}
-
-/// What is known of the camera before the first picture.
-Result<std::vector<Camera>> cameras_of(const SessionManifest& manifest) {
-  if (manifest.camera_profile.empty()) {
-    return std::vector<Camera>();
-  }
-  TM_ASSIGN_OR_RETURN(
-      const CameraProfile profile,
-      parse_camera_profile(manifest.camera_profile,
-                           fmt::format("camera profile of session {}", manifest.id)));
-  return std::vector{profile.camera};
-}
 
 std::string times_sentence(const std::vector<StageTime>& times) {
   std::string sentence = "model made:";
@@ -81,6 +37,13 @@ ModelOutcome outcome_of(const Error& error) {
     default:
       return ModelOutcome::kFailed;
   }
+}
+
+LiveMapperOptions live_options(const ModelWorkerOptions& options) {
+  LiveMapperOptions live;
+  live.reconstruction = options.reconstruction;
+  live.nice = options.nice;
+  return live;
 }
 
 /// How a finished or failed reconstruction is told. `has_model`: whether the sparse model is in
@@ -144,13 +107,7 @@ ModelWorkerOptions model_worker_options(const ReconstructionSettings& settings,
                                         const std::string& software_version) {
   ModelWorkerOptions options;
   options.nice = settings.priority;
-  ReconstructionOptions& reconstruction = options.reconstruction;
-  reconstruction.build.preset = preset_of(settings.preset);
-  reconstruction.num_threads = thread_count(settings.threads);
-  reconstruction.memory_limit_bytes =
-      kMegabyte * static_cast<std::uint64_t>(settings.memory_limit_mb);
-  reconstruction.seed = static_cast<std::uint64_t>(settings.seed);
-  reconstruction.software_version = software_version;
+  options.reconstruction = model_options(settings, software_version);
   return options;
 }
 
@@ -162,8 +119,8 @@ class ModelWorker::Listener final : public ProgressListener {
 
   void on_progress(const Progress& progress) override {
     ++worker_.progress_count_;
-    if (worker_.on_progress_) {
-      worker_.on_progress_(session_id_, progress);
+    if (worker_.listeners_.on_progress) {
+      worker_.listeners_.on_progress(session_id_, progress);
     }
   }
 
@@ -174,14 +131,11 @@ class ModelWorker::Listener final : public ProgressListener {
   const std::string session_id_;
 };
 
-ModelWorker::ModelWorker(ModelWorkerOptions options,
-                         const Clock& clock,
-                         OnAnswer on_answer,
-                         OnProgress on_progress)
+ModelWorker::ModelWorker(ModelWorkerOptions options, const Clock& clock, ModelListeners listeners)
     : options_(std::move(options)),
       clock_(clock),
-      on_answer_(std::move(on_answer)),
-      on_progress_(std::move(on_progress)),
+      listeners_(std::move(listeners)),
+      live_(live_options(options_), clock, listeners_.on_followed),
       thread_([this](const std::stop_token& end) { serve(end); }) {
   TM_CHECK(options_.validate().has_value());
 }
@@ -207,10 +161,7 @@ void ModelWorker::request_stop() {
 }
 
 void ModelWorker::serve(const std::stop_token& end) {
-  sigset_t all;
-  sigfillset(&all);
-  pthread_sigmask(SIG_SETMASK, &all, nullptr);
-  lower_priority(options_.nice);
+  become_background_thread("tm-model", options_.nice);
   std::unique_lock lock(mutex_);
   while (job_came_.wait(lock, end, [this] { return job_.has_value(); })) {
     Session session = *std::exchange(job_, std::nullopt);
@@ -219,12 +170,13 @@ void ModelWorker::serve(const std::stop_token& end) {
     const ModelAnswer answer = make_model(std::move(session), stop);
     // A model leaves its threads' arenas full of holes, 70 kB more each time: back to the system.
     ::malloc_trim(0);
-    on_answer_(answer);
+    listeners_.on_answer(answer);
     lock.lock();
   }
 }
 
 ModelAnswer ModelWorker::make_model(Session session, const std::stop_token& stop) {
+  live_.wait_for_end(session.manifest().id, stop);
   const SessionState before = session.manifest().state;
   if (const Result<> begun =
           session.set_state(SessionState::kReconstructing, "the model is being made");
@@ -245,7 +197,8 @@ ModelAnswer ModelWorker::make_model(Session session, const std::stop_token& stop
 Result<ReconstructionSummary> ModelWorker::reconstruct_session(Session& session,
                                                                const std::stop_token& stop) {
   ReconstructionOptions options = options_.reconstruction;
-  TM_ASSIGN_OR_RETURN(options.cameras, cameras_of(session.manifest()));
+  TM_ASSIGN_OR_RETURN(options.cameras,
+                      cameras_of_profile(session.manifest().camera_profile, session.manifest().id));
   TM_ASSIGN_OR_RETURN(const PhotoSet photos,
                       open_photos(session.folder().string(), Subfolders::kIgnore, MaskUse::kUse));
   SessionModelPlace place(session);

@@ -9,8 +9,10 @@
 #include <stop_token>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include "firmware/base/clock.hpp"
+#include "firmware/daemon/live_mapper.hpp"
 #include "firmware/daemon/model_maker.hpp"
 #include "firmware/pipeline/progress.hpp"
 #include "firmware/pipeline/reconstruction.hpp"
@@ -32,6 +34,17 @@ struct ModelWorkerOptions {
 [[nodiscard]] ModelWorkerOptions model_worker_options(const ReconstructionSettings& settings,
                                                       const std::string& software_version);
 
+/// Who hears of it. All but the first may be empty.
+struct ModelListeners {
+  /// The answer to begin(). Comes in the worker's thread, when the session was given up; the next
+  /// begin() may follow inside.
+  std::function<void(const ModelAnswer& answer)> on_answer;
+  /// How far it is. Comes from several threads, many times a second.
+  std::function<void(const std::string& session_id, const Progress& progress)> on_progress;
+  /// What the map of a capture says of its frames. Comes in a thread of its own.
+  std::function<void(const MapFollowed& map)> on_followed;
+};
+
 /// Makes models with the pipeline, in a thread of its own, from the kept frames of a session and
 /// with its camera profile. Finished pieces lie in the session's work folder; the model is
 /// published as it grows: sparse, dense, mesh, texture. The states that it sets:
@@ -46,17 +59,8 @@ struct ModelWorkerOptions {
 /// of threads and interruptions.
 class ModelWorker final : public ModelMaker {
  public:
-  /// The answer to begin(). Comes in the worker's thread, when the session was given up; the next
-  /// begin() may follow inside.
-  using OnAnswer = std::function<void(const ModelAnswer& answer)>;
-  /// How far it is. Comes from several threads, many times a second.
-  using OnProgress = std::function<void(const std::string& session_id, const Progress& progress)>;
-
-  /// `clock` outlives the worker. `on_progress` may be empty. Precondition: `options` are valid.
-  ModelWorker(ModelWorkerOptions options,
-              const Clock& clock,
-              OnAnswer on_answer,
-              OnProgress on_progress = {});
+  /// `clock` outlives the worker. Precondition: `options` are valid, on_answer is there.
+  ModelWorker(ModelWorkerOptions options, const Clock& clock, ModelListeners listeners);
   /// Cancels what is being made and waits for it; it is answered.
   ~ModelWorker() override;
   ModelWorker(const ModelWorker&) = delete;
@@ -67,7 +71,12 @@ class ModelWorker final : public ModelMaker {
   void begin(Session session) override;
   void request_stop() override;
 
-  [[nodiscard]] std::uint64_t progress_count() const override { return progress_count_; }
+  /// Captures are mapped while they go on (LiveMapper); begin() waits until that is done.
+  void follow(CaptureNews news) override { live_.follow(std::move(news)); }
+
+  [[nodiscard]] std::uint64_t progress_count() const override {
+    return progress_count_ + live_.progress_count();
+  }
 
  private:
   class Listener;
@@ -79,8 +88,8 @@ class ModelWorker final : public ModelMaker {
 
   const ModelWorkerOptions options_;
   const Clock& clock_;
-  const OnAnswer on_answer_;
-  const OnProgress on_progress_;
+  const ModelListeners listeners_;
+  LiveMapper live_;
   std::atomic<std::uint64_t> progress_count_ = 0;
   std::mutex mutex_;
   std::condition_variable_any job_came_;

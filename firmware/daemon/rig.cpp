@@ -166,6 +166,33 @@ void Rig::hear(StreamFrameStored& input) {
   }
 }
 
+void Rig::hear(FramesSeen& input) {
+  if (is_current(input.serial)) {
+    guide_.see(input.frames);
+    tell_advice();
+  }
+}
+
+void Rig::hear(MapFollowed& input) {
+  if (!state_.session_open || input.session_id != session_id_) {
+    return;  // the last frames of a capture that has ended
+  }
+  record(input.frame);
+  guide_.follow(input);
+  parts_.publish(kMapEvent, render_map_event(input));
+  tell_advice();
+}
+
+void Rig::tell_advice() {
+  const Advice advice = guide_.advice();
+  if (advice == told_advice_) {
+    return;
+  }
+  told_advice_ = advice;
+  parts_.publish(kAdviceEvent, render_advice_event(advice));
+  record(Note{fmt::format("advice: {}", sentence_of(advice))});
+}
+
 void Rig::hear(StillAnswered& input) {
   if (!is_current(input.serial)) {
     return;
@@ -330,6 +357,8 @@ void Rig::advance(const RigEvent& event, nanoseconds time) {
 void Rig::act(const OpenSession& /*action*/) {
   serial_ = SessionSerial{static_cast<std::uint64_t>(serial_) + 1};
   session_id_.clear();
+  guide_.begin();
+  told_advice_ = Advice::kNone;
   parts_.storage.push(OpenSessionOrder{serial_});
   (void)parts_.capture.push(HoldCamera{serial_});
   for (const EdgeRecord& edge : std::exchange(recent_edges_, {})) {
@@ -431,17 +460,19 @@ void Rig::tell_frame() {
 }
 
 void Rig::show() {
-  parts_.light.set(pattern_of(state_, last_outcome_));
   const RigPhase phase = phase_of(state_);
   if (!state_.session_open) {
     session_id_.clear();
+    told_advice_ = Advice::kNone;
   }
+  parts_.light.set(pattern_of(state_, last_outcome_, told_advice_));
   parts_.status.update([&](ControlStatus& status) {
     status.phase = phase;
     status.camera_present = state_.camera_present;
     status.storage = state_.storage;
     status.session_id = session_id_;
     status.frames = state_.frames;
+    status.advice = told_advice_ == Advice::kNone ? "" : std::string(sentence_of(told_advice_));
     status.job = state_.job;
     status.queued_models = state_.queued;
     status.model_session_id = model_id_;

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "firmware/base/clock.hpp"
+#include "firmware/daemon/guide.hpp"
 #include "firmware/daemon/heartbeat.hpp"
 #include "firmware/daemon/light.hpp"
 #include "firmware/daemon/logging.hpp"
@@ -63,6 +64,8 @@ class Rig {
   void hear(SessionOpened& input);
   void hear(SessionLost& input);
   void hear(StreamFrameStored& input);
+  void hear(FramesSeen& input);
+  void hear(MapFollowed& input);
   void hear(StillAnswered& input);
   void hear(StreamDrained& input);
   void hear(UndoAnswered& input);
@@ -100,6 +103,7 @@ class Rig {
   void record(JournalEntry entry);
   void show();
   void tell_frame();
+  void tell_advice();
   [[nodiscard]] std::chrono::nanoseconds longest_wait() const;
 
   [[nodiscard]] bool is_current(SessionSerial serial) const {
@@ -131,6 +135,8 @@ class Rig {
   LastOutcome last_outcome_ = LastOutcome::kNone;
   std::optional<RigPhase> told_phase_;
   std::string told_session_;
+  Guide guide_;
+  Advice told_advice_ = Advice::kNone;
   bool has_ended_ = false;
 };
 

@@ -18,4 +18,20 @@ std::string render_refused_event(PressRefusal reason) {
   return Json{{"reason", to_string(reason)}}.dump();
 }
 
+std::string render_advice_event(Advice advice) {
+  return Json{{"advice", to_string(advice)}, {"text", sentence_of(advice)}}.dump();
+}
+
+std::string render_map_event(const MapFollowed& map) {
+  const std::chrono::duration<double, std::milli> duration = map.frame.duration;
+  return Json{{"session", map.session_id},
+              {"frame", map.frame.number},
+              {"following", to_string(map.frame.following)},
+              {"photographs", map.photographs},
+              {"tracked", map.tracked},
+              {"waiting", map.frame.waiting},
+              {"milliseconds", duration.count()}}
+      .dump();
+}
+
 }  // namespace trigmesh

@@ -46,6 +46,12 @@ struct StreamFrameStored {
   std::uint32_t number = 0;
 };
 
+/// What was said of frames of the stream.
+struct FramesSeen {
+  SessionSerial serial{};
+  std::vector<FrameJudged> frames;
+};
+
 /// Answers a still: the number of the frame, or why there is none.
 struct StillAnswered {
   SessionSerial serial{};
@@ -92,6 +98,8 @@ using RigInput = std::variant<EdgeSeen,
                               SessionOpened,
                               SessionLost,
                               StreamFrameStored,
+                              FramesSeen,
+                              MapFollowed,
                               StillAnswered,
                               StreamDrained,
                               UndoAnswered,

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 
+#include "firmware/daemon/keyframe_stream.hpp"
+#include "sfm/exchange/camera_profile.hpp"
+
 namespace trigmesh {
 namespace {
 
@@ -49,17 +52,43 @@ RigLoopOptions rig_options(const Settings& settings) {
   return options;
 }
 
-CaptureOptions capture_options(const Settings& settings) {
+/// Frames that come before a press is heard of.
+std::size_t frames_until_heard(const Settings& settings) {
+  const nanoseconds interval = nanoseconds(std::chrono::seconds(1)) / settings.camera.rate_hz;
+  const auto late = static_cast<std::size_t>((settings.trigger.debounce + kLateness) / interval);
+  return std::clamp<std::size_t>(late + 3, 4, kMostHistory);
+}
+
+/// Copies that a selector of frames holds: the best of a group and its successor, or all that may
+/// still become keyframes.
+std::size_t selector_copies(const CaptureOptions& options) {
+  return options.group_size == 0 ? keyframe_copies(options.keyframes, options.frame_interval) : 2;
+}
+
+/// What the selector of keyframes has to know of the lens. A profile that cannot be read is told by
+/// whoever makes a model with it.
+KeyframeOptions keyframe_options(const std::string& profile) {
+  KeyframeOptions options;
+  if (const auto parsed = parse_camera_profile(profile, "camera profile"); parsed) {
+    const Camera& camera = parsed->camera;
+    options.focal_ratio = focal_ratio_of(camera.fx_px, std::max(camera.width_px, camera.height_px));
+  }
+  return options;
+}
+
+CaptureOptions capture_options(const Settings& settings, const std::string& profile) {
   CaptureOptions options;
+  options.keyframes = keyframe_options(profile);
   options.frame_interval = nanoseconds(std::chrono::seconds(1)) / settings.camera.rate_hz;
   options.stills.wait = settings.capture.still_wait;
   options.stills.history = 0;
   if (settings.capture.mode == CaptureSettings::Mode::kStill) {
-    const auto late =
-        static_cast<std::size_t>((settings.trigger.debounce + kLateness) / options.frame_interval);
-    options.stills.history = std::clamp<std::size_t>(late + 3, 4, kMostHistory);
+    options.stills.history = frames_until_heard(settings);
   }
   options.group_size = static_cast<std::size_t>(settings.capture.every_nth_sharp_frame);
+  if (settings.capture.mode == CaptureSettings::Mode::kVideo) {
+    options.pre_trigger_frames = frames_until_heard(settings);
+  }
   options.hold = {wanted_controls(settings.camera), settings.camera.lock_controls};
   options.silence = std::max<nanoseconds>(std::chrono::seconds(2), 10 * options.frame_interval);
   return options;
@@ -85,6 +114,8 @@ StorageOptions storage_options(const Settings& settings,
   session.settings = render_settings(settings);
   session.seed = static_cast<std::uint64_t>(settings.reconstruction.seed);
   options.store.jpeg_quality = settings.capture.jpeg_quality;
+  options.tells_captures = settings.capture.mode == CaptureSettings::Mode::kVideo &&
+                           settings.reconstruction.enabled && settings.reconstruction.live;
   return options;
 }
 
@@ -95,11 +126,16 @@ DaemonOptions options_of_settings(const Settings& settings,
                                   const std::string& software_version) {
   DaemonOptions options;
   options.rig = rig_options(settings);
-  options.capture = capture_options(settings);
+  options.capture = capture_options(settings, profile);
   options.storage = storage_options(settings, profile, software_version);
   options.stream_queue_frames = static_cast<std::size_t>(settings.capture.queue_frames);
-  // What the shelf holds, what waits, the best of a group and its successor, one being stored.
-  options.copies = options.capture.stills.history + options.stream_queue_frames + 4;
+  // What the shelf or the ring before a press holds, what the selector holds, what waits, one being
+  // stored and one on its way.
+  options.copies = options.capture.stills.history + options.capture.pre_trigger_frames +
+                   options.stream_queue_frames + 2;
+  if (settings.capture.mode == CaptureSettings::Mode::kVideo) {
+    options.copies += selector_copies(options.capture);
+  }
   options.command_patience = settings.capture.still_wait + milliseconds(30'000);
   options.repeat_interval = settings.log.repeat_interval;
   options.software_version = software_version;

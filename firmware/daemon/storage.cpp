@@ -27,6 +27,7 @@ void Storage::run() {
       std::visit([this](auto& one) { do_order(std::move(one)); }, *order);
     }
   }
+  tell_capture_ended();
   if (store_.has_session()) {  // it was not closed in order: the next start does it
     store_.drop_session();
   }
@@ -119,6 +120,7 @@ void Storage::disk_failed(const Error& error) {
   if (store_.has_session()) {
     (void)parts_.rig.push(SessionLost{serial_, error});
   }
+  tell_capture_ended();
   store_.give_up();
   parts_.models.request_stop();
   report(StorageLevel::kFull, 0);
@@ -146,6 +148,7 @@ void Storage::do_order(OpenSessionOrder order) {
     return;
   }
   write_log(LogLevel::kInfo, "session begins", {{"session", *id}});
+  tell_capture_began();
   (void)parts_.rig.push(SessionOpened{order.serial, *id});
 }
 
@@ -169,10 +172,29 @@ Result<std::uint32_t> Storage::store_frame(const TimedFrame& timed) {
     write_log(LogLevel::kDebug,
               "frame is stored",
               {{"session", store_.session().manifest().id}, {"frame", std::to_string(*number)}});
+    tell_capture(CaptureFrame{*number, store_.session().frame_path(*number)});
     return number;
   }
   refuse(timed, number.error());
   return number;
+}
+
+void Storage::tell_capture(CaptureNews news) {
+  if (is_capture_told_) {
+    parts_.models.follow(std::move(news));
+  }
+}
+
+void Storage::tell_capture_began() {
+  is_capture_told_ = options_.tells_captures;
+  const Session& session = store_.session();
+  tell_capture(CaptureBegan{
+      session.manifest().id, session.work_folder(), session.manifest().camera_profile});
+}
+
+void Storage::tell_capture_ended() {
+  tell_capture(CaptureEnded{});
+  is_capture_told_ = false;
 }
 
 void Storage::refuse(const TimedFrame& timed, const Error& error) {
@@ -233,6 +255,9 @@ void Storage::do_order(UndoOrder order) {
     return;
   }
   Result<std::uint32_t> number = store_.session().undo_last_frame();
+  if (number) {
+    tell_capture(CaptureUndone{});
+  }
   const bool is_broken = store_.session().is_broken();
   const Error error = number ? Error{} : number.error();
   (void)parts_.rig.push(UndoAnswered{order.serial, std::move(number)});
@@ -246,6 +271,7 @@ void Storage::do_order(CloseOrder order) {
     return;
   }
   const std::string id = store_.session().manifest().id;
+  tell_capture_ended();
   const bool keeps = order.end == SessionEnd::kKeep;
   const auto done =
       keeps ? store_.close_session(order.why, drops_of_session()) : store_.discard_session();

@@ -18,6 +18,8 @@ struct StorageOptions {
   FrameStoreOptions store;
   /// How often the free space is looked at, and a disk that failed is tried again. > 0.
   std::chrono::nanoseconds check_interval = std::chrono::seconds(2);
+  /// Whether the maker of models hears of frames while they are captured.
+  bool tells_captures = false;
 };
 
 /// What the storage thread works with; all of it outlives it.
@@ -69,6 +71,9 @@ class Storage {
 
   [[nodiscard]] Result<std::uint32_t> store_frame(const TimedFrame& timed);
   void refuse(const TimedFrame& timed, const Error& error);
+  void tell_capture(CaptureNews news);
+  void tell_capture_began();
+  void tell_capture_ended();
 
   [[nodiscard]] bool is_current(SessionSerial serial) const {
     return store_.has_session() && serial == serial_;
@@ -83,8 +88,9 @@ class Storage {
   FrameStore store_;
   SessionSerial serial_{};  ///< of the open session
   DropCounts drops_at_begin_;
-  std::string model_id_;   ///< at work; empty: none
-  std::string export_id_;  ///< on its way; empty: none
+  bool is_capture_told_ = false;  ///< it began, and did not end
+  std::string model_id_;          ///< at work; empty: none
+  std::string export_id_;         ///< on its way; empty: none
   std::optional<StorageReport> told_;
   std::optional<std::chrono::nanoseconds> last_check_;
 };

@@ -1,13 +1,10 @@
 #pragma once
 
 #include <chrono>
-#include <cstddef>
 #include <cstdint>
-#include <optional>
+#include <vector>
 
 #include "firmware/daemon/capture_types.hpp"
-#include "firmware/daemon/frame_copies.hpp"
-#include "firmware/imaging/sharpness.hpp"
 
 namespace trigmesh {
 
@@ -15,47 +12,42 @@ namespace trigmesh {
 struct StreamCounts {
   std::uint64_t seen = 0;
   std::uint64_t kept = 0;
-  std::uint64_t less_sharp = 0;
-  std::uint64_t damaged = 0;    ///< could not be measured: no picture
-  std::uint64_t no_buffer = 0;  ///< the storage had all buffers
+  std::uint64_t not_chosen = 0;  ///< another one was kept in its place, or none was needed
+  std::uint64_t damaged = 0;     ///< could not be looked at: no picture
+  std::uint64_t no_buffer = 0;   ///< the storage had all buffers
 };
 
-/// Keeps the sharpest frame of each group of frames that follow each other. Thread-compatible.
+/// What became certain with a frame. Empty most of the time: then nothing is allocated.
+struct StreamChoice {
+  std::vector<TimedFrame> kept;     ///< in the order of their times
+  std::vector<FrameJudged> judged;  ///< with reasons, where there are any
+};
+
+/// Chooses the frames of a stream that are kept. Thread-compatible.
 class StreamSelector {
  public:
-  /// `group_size` >= 1; 1 keeps all frames. `copies` outlives it.
-  StreamSelector(std::size_t group_size, FrameCopies& copies)
-      : group_size_(group_size), copies_(copies) {}
+  StreamSelector() = default;
+  StreamSelector(const StreamSelector&) = delete;
+  StreamSelector& operator=(const StreamSelector&) = delete;
+  StreamSelector(StreamSelector&&) = delete;
+  StreamSelector& operator=(StreamSelector&&) = delete;
+  virtual ~StreamSelector() = default;
 
   /// A stream begins: frames that were exposed before `from` do not belong to it.
-  void begin(std::chrono::nanoseconds from);
+  virtual void begin(std::chrono::nanoseconds from) = 0;
 
-  /// A frame came. The frame that is kept, when it completes a group. Precondition: is_streaming().
-  [[nodiscard]] std::optional<TimedFrame> offer(const Frame& frame,
-                                                const FrameTimes& times,
-                                                std::uint64_t sequence);
+  /// A frame came. Precondition: is_streaming().
+  [[nodiscard]] virtual StreamChoice offer(const Frame& frame,
+                                           const FrameTimes& times,
+                                           std::uint64_t sequence) = 0;
 
-  /// The stream ends. The sharpest of a group that has half of its frames, or that is the first.
-  [[nodiscard]] std::optional<TimedFrame> end();
+  /// The stream ends: decides what is left.
+  [[nodiscard]] virtual StreamChoice end() = 0;
 
-  [[nodiscard]] bool is_streaming() const { return is_streaming_; }
+  [[nodiscard]] virtual bool is_streaming() const = 0;
 
   /// Of the stream that runs, or ended last.
-  [[nodiscard]] const StreamCounts& counts() const { return counts_; }
-
- private:
-  void compare(const Frame& frame, const FrameTimes& times, std::uint64_t sequence);
-  [[nodiscard]] std::optional<TimedFrame> finish_group();
-
-  std::size_t group_size_;
-  FrameCopies& copies_;
-  SharpnessMeter meter_;
-  bool is_streaming_ = false;
-  std::chrono::nanoseconds from_{};
-  std::size_t in_group_ = 0;
-  std::optional<TimedFrame> best_;
-  double best_sharpness_ = 0.0;
-  StreamCounts counts_;
+  [[nodiscard]] virtual const StreamCounts& counts() const = 0;
 };
 
 }  // namespace trigmesh

@@ -1,58 +1,12 @@
 #include "firmware/imaging/sharpness.hpp"
 
-#include <algorithm>
 #include <cstddef>
-
-#include <turbojpeg.h>
+#include <vector>
 
 #include "firmware/base/check.hpp"
-#include "sfm/exchange/image_codec.hpp"
 
 namespace trigmesh {
 namespace {
-
-constexpr std::int64_t kMaxPixels = 200'000'000;
-
-/// Where the brightness lies in a row: bytes from the first to the second pixel, and before the
-/// first. Bayer patterns and colours are taken for brightness as they are: green is most of it.
-struct BrightnessBytes {
-  std::size_t first = 0;
-  std::size_t step = 1;
-};
-
-BrightnessBytes brightness_of(PixelFormat format) {
-  switch (format) {
-    case PixelFormat::kYuyv:
-      return {0, 2};
-    case PixelFormat::kUyvy:
-      return {1, 2};
-    case PixelFormat::kRgb24:
-    case PixelFormat::kBgr24:
-      return {1, 3};
-    default:
-      return {0, 1};
-  }
-}
-
-bool is_bayer(PixelFormat format) {
-  return format == PixelFormat::kBayerRggb || format == PixelFormat::kBayerGrbg ||
-         format == PixelFormat::kBayerGbrg || format == PixelFormat::kBayerBggr;
-}
-
-/// The mean of `side` x `side` pixels that begin at `bytes`.
-std::uint8_t mean_of_block(const std::uint8_t* bytes,
-                           std::size_t stride,
-                           std::size_t step,
-                           std::size_t side) {
-  std::size_t sum = 0;
-  for (std::size_t row = 0; row < side; ++row) {
-    const std::uint8_t* pixel = bytes + row * stride;
-    for (std::size_t column = 0; column < side; ++column, pixel += step) {
-      sum += *pixel;
-    }
-  }
-  return static_cast<std::uint8_t>(sum / (side * side));
-}
 
 double variance_of_laplacian(const std::vector<std::uint8_t>& grey, int width, int height) {
   if (width < 3 || height < 3) {
@@ -77,119 +31,10 @@ double variance_of_laplacian(const std::vector<std::uint8_t>& grey, int width, i
 
 }  // namespace
 
-struct SharpnessMeter::Decoder {
-  Decoder() : handle(tjInitDecompress()) {}
-
-  Decoder(const Decoder&) = delete;
-  Decoder& operator=(const Decoder&) = delete;
-  Decoder(Decoder&&) = delete;
-  Decoder& operator=(Decoder&&) = delete;
-
-  ~Decoder() {
-    if (handle != nullptr) {
-      (void)tjDestroy(handle);
-    }
-  }
-
-  tjhandle handle;
-};
-
-SharpnessMeter::SharpnessMeter() : decoder_(std::make_unique<Decoder>()) {}
-
-SharpnessMeter::~SharpnessMeter() = default;
-
 Result<double> SharpnessMeter::measure(const FrameLayout& layout,
                                        std::span<const std::uint8_t> bytes) {
-  if (layout.format == PixelFormat::kJpeg) {
-    TM_RETURN_IF_ERROR(reduce_jpeg(bytes));
-  } else if (layout.format == PixelFormat::kPng) {
-    TM_RETURN_IF_ERROR(reduce_png(bytes));
-  } else {
-    TM_RETURN_IF_ERROR(reduce_raw(layout, bytes));
-  }
-  return variance_of_laplacian(grey_, width_, height_);
-}
-
-Result<> SharpnessMeter::reduce_jpeg(std::span<const std::uint8_t> bytes) {
-  int width = 0;
-  int height = 0;
-  int subsampling = 0;
-  int colours = 0;
-  tjhandle handle = decoder_->handle;
-  const auto size = static_cast<unsigned long>(bytes.size());
-  if (handle == nullptr ||
-      tjDecompressHeader3(handle, bytes.data(), size, &width, &height, &subsampling, &colours) !=
-          0) {
-    return fail(ErrorCode::kCorruptData, "cannot measure a frame: {}", tjGetErrorStr2(handle));
-  }
-  if (std::int64_t{width} * height > kMaxPixels) {
-    return fail(ErrorCode::kLimitExceeded,
-                "cannot measure a frame of {} x {} pixels: more than {}",
-                width,
-                height,
-                kMaxPixels);
-  }
-  int divisor = 1;
-  while (divisor < 8 && width / (2 * divisor) >= kWidthPx) {
-    divisor *= 2;
-  }
-  width_ = (width + divisor - 1) / divisor;
-  height_ = (height + divisor - 1) / divisor;
-  grey_.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
-  if (tjDecompress2(handle,
-                    bytes.data(),
-                    size,
-                    grey_.data(),
-                    width_,
-                    /*pitch=*/width_,
-                    height_,
-                    TJPF_GRAY,
-                    TJFLAG_FASTDCT) != 0 &&
-      tjGetErrorCode(handle) != TJERR_WARNING) {
-    return fail(ErrorCode::kCorruptData, "cannot measure a frame: {}", tjGetErrorStr2(handle));
-  }
-  return {};
-}
-
-Result<> SharpnessMeter::reduce_png(std::span<const std::uint8_t> bytes) {
-  TM_ASSIGN_OR_RETURN(
-      const DecodedImage image,
-      decode_image(bytes, {.channels = ImageChannels::kGrey, .max_pixels = kMaxPixels}));
-  FrameLayout layout;
-  layout.format = PixelFormat::kGrey;
-  layout.width_px = image.grey.cols;
-  layout.height_px = image.grey.rows;
-  layout.stride_bytes = image.grey.step[0];
-  return reduce_raw(layout, {image.grey.data, image.grey.total()});
-}
-
-Result<> SharpnessMeter::reduce_raw(const FrameLayout& layout,
-                                    std::span<const std::uint8_t> bytes) {
-  if (layout.width_px <= 0 || layout.height_px <= 0 || bytes.size() < needed_bytes(layout) ||
-      layout.stride_bytes < row_bytes(layout.format, layout.width_px)) {
-    return fail(ErrorCode::kCorruptData,
-                "cannot measure a frame of {} with {} x {} pixels: it has {} bytes",
-                to_string(layout.format),
-                layout.width_px,
-                layout.height_px,
-                bytes.size());
-  }
-  // A Bayer pattern is averaged over whole cells, or it would count as edges.
-  const int smallest_side = is_bayer(layout.format) ? 2 : 1;
-  const int side = std::max(layout.width_px / kWidthPx, smallest_side);
-  width_ = layout.width_px / side;
-  height_ = layout.height_px / side;
-  grey_.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
-  const auto [first, step] = brightness_of(layout.format);
-  const auto block = static_cast<std::size_t>(side);
-  std::uint8_t* out = grey_.data();
-  for (std::size_t y = 0; y < static_cast<std::size_t>(height_); ++y) {
-    const std::uint8_t* row = bytes.data() + y * block * layout.stride_bytes + first;
-    for (std::size_t x = 0; x < static_cast<std::size_t>(width_); ++x) {
-      *out++ = mean_of_block(row + x * block * step, layout.stride_bytes, step, block);
-    }
-  }
-  return {};
+  TM_RETURN_IF_ERROR(reducer_.reduce(layout, bytes));
+  return variance_of_laplacian(reducer_.grey(), reducer_.width_px(), reducer_.height_px());
 }
 
 }  // namespace trigmesh

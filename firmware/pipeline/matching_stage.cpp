@@ -143,10 +143,8 @@ Result<std::vector<PairRecord>> match_photos(const std::vector<ExtractedImage>& 
 
 Result<std::vector<PairRecord>> match_walk(const std::vector<ExtractedImage>& images,
                                            const CameraGroups& cameras,
-                                           const MapperOptions& mapper,
+                                           const SequenceMatchingOptions& options,
                                            const StageContext& context) {
-  SequenceMatchingOptions options;
-  options.mapper = mapper;
   TM_ASSIGN_OR_RETURN(auto matcher,
                       SequenceMatcher::create(options, context.executor, context.checkpoints));
   StageProgress progress(context, Stage::kMatch, images.size());

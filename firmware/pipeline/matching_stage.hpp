@@ -5,6 +5,7 @@
 #include "firmware/base/result.hpp"
 #include "firmware/pipeline/camera_groups.hpp"
 #include "firmware/pipeline/extraction_stage.hpp"
+#include "firmware/pipeline/sequence_matching.hpp"
 #include "firmware/pipeline/stage_context.hpp"
 #include "sfm/mapping/image_store.hpp"
 #include "sfm/matching/pair_selection.hpp"
@@ -31,7 +32,7 @@ struct MatchingStageOptions {
 /// checkpoint, which does not depend on those after it.
 [[nodiscard]] Result<std::vector<PairRecord>> match_walk(const std::vector<ExtractedImage>& images,
                                                          const CameraGroups& cameras,
-                                                         const MapperOptions& mapper,
+                                                         const SequenceMatchingOptions& options,
                                                          const StageContext& context);
 
 /// Bytes for a checkpoint and back. Decoding anything else gives kCorruptData.

@@ -12,6 +12,7 @@
 #include <opencv2/core/mat.hpp>
 
 #include "firmware/base/result.hpp"
+#include "firmware/pipeline/report_sections.hpp"
 
 namespace trigmesh {
 
@@ -25,6 +26,8 @@ struct PhotoSet {
   /// When each was taken, rising, for the frames of a video from which keyframes may be chosen;
   /// empty: every photograph is wanted.
   std::vector<std::chrono::nanoseconds> timestamps{};
+  /// What was said of the frames of the video that they are from, for the report.
+  std::vector<VideoFrameSection> frames{};
   std::string description;  ///< for the report, e.g. "photo folder, 25 photographs"
   /// The encoded bytes (JPEG or PNG) of a photograph. Thread-safe.
   std::function<Result<std::vector<std::uint8_t>>(std::size_t)> read;

@@ -1,7 +1,6 @@
 #include "firmware/pipeline/reconstruction.hpp"
 
 #include <algorithm>
-#include <map>
 #include <system_error>
 
 #include <fmt/format.h>
@@ -24,9 +23,6 @@ namespace trigmesh {
 namespace {
 
 constexpr int kMaxThreads = 256;
-// What KeyframeOptions allows.
-constexpr double kMinFocalRatio = 0.2;
-constexpr double kMaxFocalRatio = 10.0;
 
 /// Size of the largest photograph, from the headers of the files; files that cannot be read count
 /// as empty.
@@ -48,22 +44,6 @@ Result<MemoryPlan> plan_for(const PhotoSet& photos, const ReconstructionOptions&
     demand.largest_image_pixels = largest_image_pixels(photos);
   }
   return plan_memory(demand, options.features, options.memory_limit_bytes);
-}
-
-/// Equal files: the later one adds nothing and would only look like perfect overlap.
-void refuse_duplicates(const PhotoSet& photos, std::vector<ExtractedImage>& images) {
-  std::map<std::uint64_t, std::size_t> first_with;
-  for (std::size_t i = 0; i < images.size(); ++i) {
-    if (!images[i].features) {
-      continue;
-    }
-    const auto [place, is_new] = first_with.try_emplace(images[i].features->content, i);
-    if (!is_new) {
-      images[i] = {std::nullopt,
-                   {ErrorCode::kInsufficientData,
-                    fmt::format("the same file as {}", photos.names[place->second])}};
-    }
-  }
 }
 
 Result<> check_readable(const PhotoSet& photos, const std::vector<ExtractedImage>& images) {
@@ -120,7 +100,6 @@ std::vector<PairEvidence> evidence_of(const std::vector<PairRecord>& pairs) {
 }
 
 ReconstructionReport report_on(const PhotoSet& photos,
-                               std::span<const VideoFrameSection> frames,
                                const ReconstructionOptions& options,
                                const MemoryPlan& plan,
                                const CameraGroups& cameras,
@@ -131,7 +110,7 @@ ReconstructionReport report_on(const PhotoSet& photos,
   ReportInput input;
   input.components = mapped.components;
   input.images = mapped.outcomes;
-  input.frames = frames;
+  input.frames = photos.frames;
   input.pairs = evidence;
   input.intrinsics_origins = origins;
   input.settings = report_settings(options, plan);
@@ -218,7 +197,6 @@ namespace {
 /// What is needed from the first stage to the last.
 struct Run {
   const PhotoSet& photos;
-  std::span<const VideoFrameSection> frames;  ///< of the video that the photographs are from
   const ReconstructionPlaces& places;
   const ReconstructionOptions& options;
   const CheckpointFolder& checkpoints;
@@ -239,7 +217,6 @@ Result<PhotoFeatures> extract(const Run& run, const MemoryPlan& plan) {
   TM_ASSIGN_OR_RETURN(auto images,
                       extract_photos(run.photos, run.options.feature_kind, plan.features, context));
   TM_RETURN_IF_ERROR(check_readable(run.photos, images));
-  refuse_duplicates(run.photos, images);
   TM_ASSIGN_OR_RETURN(CameraGroups cameras,
                       run.options.poses ? groups_of_model(run.photos, images, *run.options.poses)
                                         : group_cameras(grouping_images(run.photos, images),
@@ -261,12 +238,13 @@ Result<std::vector<PairRecord>> match(const Run& run,
   const ReconstructionOptions& options = run.options;
   const bool follows_walk =
       run.photos.is_walk && options.pair_mode == PairMode::kAuto && !options.poses;
-  auto pairs = follows_walk
-                   ? match_walk(features.images, features.cameras, mapper_options(options), context)
-                   : match_photos(features.images,
-                                  features.cameras,
-                                  {options.pair_mode, run.photos.ordered, options.seed},
-                                  context);
+  auto pairs =
+      follows_walk
+          ? match_walk(features.images, features.cameras, walk_matching_options(options), context)
+          : match_photos(features.images,
+                         features.cameras,
+                         {options.pair_mode, run.photos.ordered, options.seed},
+                         context);
   run.stopwatch.finish(Stage::kMatch);
   return pairs;
 }
@@ -296,7 +274,7 @@ Result<ReconstructionSummary> run_stages(const Run& run) {
 
   run.listener.on_progress({Stage::kWrite, 0, 1});
   ReconstructionSummary summary{
-      report_on(run.photos, run.frames, options, plan, features.cameras, pairs, mapped), {}};
+      report_on(run.photos, options, plan, features.cameras, pairs, mapped), {}};
   TM_RETURN_IF_ERROR(write_model(run.places.model, mapped.components, summary.report));
   run.listener.on_progress({Stage::kWrite, 1, 1});
   run.stopwatch.finish(Stage::kWrite);
@@ -314,8 +292,8 @@ KeyframeOptions keyframe_options(const ReconstructionOptions& options) {
   KeyframeOptions keyframes;
   if (!options.cameras.empty()) {
     const Camera& camera = options.cameras.front();
-    keyframes.focal_ratio = std::clamp(
-        camera.fx_px / std::max(camera.width_px, camera.height_px), kMinFocalRatio, kMaxFocalRatio);
+    keyframes.focal_ratio =
+        focal_ratio_of(camera.fx_px, std::max(camera.width_px, camera.height_px));
   }
   return keyframes;
 }
@@ -326,21 +304,15 @@ Result<ReconstructionSummary> run_on_frames(const Run& run) {
   if (!selects) {
     return run_stages(run);
   }
-  const auto chosen = [&]() -> Result<ChosenFrames> {
+  const auto chosen = [&]() -> Result<PhotoSet> {
     WorkerPool pool(run.options.num_threads, run.stop, &run.listener);
     return choose_keyframes(
         run.photos, keyframe_options(run.options), {pool, run.checkpoints, run.listener, run.stop});
   }();
   TM_RETURN_IF_ERROR(chosen);
   run.stopwatch.finish(Stage::kSelectFrames);
-  return run_stages({chosen->photos,
-                     chosen->frames,
-                     run.places,
-                     run.options,
-                     run.checkpoints,
-                     run.listener,
-                     run.stop,
-                     run.stopwatch});
+  return run_stages(
+      {*chosen, run.places, run.options, run.checkpoints, run.listener, run.stop, run.stopwatch});
 }
 
 /// Writes the times and tidies up.
@@ -380,7 +352,7 @@ Result<ReconstructionSummary> reconstruct(const PhotoSet& photos,
   }
   TM_ASSIGN_OR_RETURN(const CheckpointFolder checkpoints, CheckpointFolder::open(places.work));
   Stopwatch stopwatch(clock);
-  const Run run{photos, {}, places, options, checkpoints, listener, stop, stopwatch};
+  const Run run{photos, places, options, checkpoints, listener, stop, stopwatch};
   TM_ASSIGN_OR_RETURN(ReconstructionSummary summary, stoppable([&] { return run_on_frames(run); }));
   TM_RETURN_IF_ERROR(finish(run, summary));
   return summary;

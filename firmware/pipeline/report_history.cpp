@@ -90,6 +90,14 @@ Result<ImageOutcome> parse_image(const Json& json) {
   return image;  // the rest is computed from the scenes
 }
 
+Result<LiveMapping> parse_live(const Json& json) {
+  LiveMapping live;
+  TM_ASSIGN_OR_RETURN(live.following, text_of(json, "following"));
+  TM_ASSIGN_OR_RETURN(live.duration_s, number_of(json, "seconds"));
+  TM_ASSIGN_OR_RETURN(live.waiting, count_of(json, "waiting"));
+  return live;
+}
+
 Result<VideoFrameSection> parse_frame(const Json& json) {
   VideoFrameSection frame;
   FrameMeasures& measures = frame.measures;
@@ -102,6 +110,9 @@ Result<VideoFrameSection> parse_frame(const Json& json) {
   TM_ASSIGN_OR_RETURN(measures.motion_deg, number_of(json, "motion_deg"));
   TM_ASSIGN_OR_RETURN(measures.parallax_deg, number_of(json, "parallax_deg"));
   TM_ASSIGN_OR_RETURN(measures.overlap, number_of(json, "overlap"));
+  if (const auto live = json.find("live"); live != json.end()) {
+    TM_ASSIGN_OR_RETURN(frame.live, parse_live(*live));
+  }
   return frame;
 }
 

@@ -94,9 +94,17 @@ Json to_json(const ImageReport& image) {
   };
 }
 
+Json to_json(const LiveMapping& live) {
+  return {
+      {"following", live.following},
+      {"seconds", rounded(live.duration_s, kRatioDigits)},
+      {"waiting", live.waiting},
+  };
+}
+
 Json to_json(const VideoFrameSection& frame) {
   const FrameMeasures& measures = frame.measures;
-  return {
+  Json json = {
       {"name", frame.name},
       {"time_s", rounded(frame.time_s, kRatioDigits)},
       {"verdict", to_string(frame.verdict)},
@@ -107,6 +115,10 @@ Json to_json(const VideoFrameSection& frame) {
       {"parallax_deg", rounded(measures.parallax_deg, kAngleDigits)},
       {"overlap", rounded(measures.overlap, kRatioDigits)},
   };
+  if (frame.live) {
+    json["live"] = to_json(*frame.live);
+  }
+  return json;
 }
 
 Json to_json(const PairEvidence& pair) {

@@ -15,12 +15,20 @@ namespace trigmesh {
 // pipeline; the sections that are missing are not shown. Lengths are in scene units, areas in their
 // squares.
 
+/// How a frame was mapped while it was captured.
+struct LiveMapping {
+  std::string following;    ///< "waiting", "tracked", "lost"
+  double duration_s = 0.0;  ///< of the mapping
+  std::size_t waiting = 0;  ///< frames that waited to be mapped, then
+};
+
 /// A frame of the video from which the photographs were chosen.
 struct VideoFrameSection {
   std::string name;
   double time_s = 0.0;  ///< since the first frame
   FrameVerdict verdict = FrameVerdict::kKept;
   FrameMeasures measures{};
+  std::optional<LiveMapping> live{};  ///< kept ones of a capture that was mapped while it went on
 };
 
 /// Depth maps and the cloud that was made of them.

@@ -48,6 +48,13 @@ std::uint64_t key_of(const ExtractedImage& image,
 
 }  // namespace
 
+SequenceMatchingOptions walk_matching_options(const ReconstructionOptions& options) {
+  SequenceMatchingOptions matching;
+  matching.mapper = options.mapper;
+  matching.mapper.seed = options.seed;
+  return matching;
+}
+
 Result<SequenceMatcher> SequenceMatcher::create(const SequenceMatchingOptions& options,
                                                 Executor& executor,
                                                 const CheckpointFolder& checkpoints) {

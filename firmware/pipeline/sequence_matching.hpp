@@ -12,6 +12,7 @@
 #include "firmware/pipeline/camera_groups.hpp"
 #include "firmware/pipeline/checkpoint.hpp"
 #include "firmware/pipeline/extraction_stage.hpp"
+#include "firmware/pipeline/reconstruction.hpp"
 #include "sfm/mapping/image_store.hpp"
 #include "sfm/mapping/mapper.hpp"
 #include "sfm/matching/pair_matching.hpp"
@@ -33,6 +34,9 @@ struct SequenceMatchingOptions {
   /// A pair far back in time that disagrees with the chain map by more is a look-alike, degrees.
   double max_disagreement_deg = 10.0;
 };
+
+/// As reconstruct() compares the keyframes of a walk.
+[[nodiscard]] SequenceMatchingOptions walk_matching_options(const ReconstructionOptions& options);
 
 /// How a keyframe stands to the chain map of those before it.
 enum class SequenceFollowing {

@@ -65,8 +65,8 @@ class VideoReader {
     return {};
   }
 
-  [[nodiscard]] ChosenFrames chosen() const {
-    ChosenFrames result;
+  [[nodiscard]] PhotoSet chosen() const {
+    std::vector<VideoFrameSection> frames;
     std::vector<std::size_t> kept;
     for (std::size_t i = 0; i < photos_.names.size(); ++i) {
       if (is_kept_[i]) {
@@ -74,13 +74,14 @@ class VideoReader {
       }
       if (decisions_[i]) {
         const std::chrono::duration<double> time = photos_.timestamps[i] - photos_.timestamps[0];
-        result.frames.push_back(
+        frames.push_back(
             {photos_.names[i], time.count(), decisions_[i]->verdict, decisions_[i]->measures});
       }
     }
-    result.photos = subset(photos_, kept);
-    result.photos.is_walk = true;
-    result.photos.description = fmt::format(
+    PhotoSet result = subset(photos_, kept);
+    result.is_walk = true;
+    result.frames = std::move(frames);
+    result.description = fmt::format(
         "{}, {} of {} frames kept", photos_.description, kept.size(), photos_.names.size());
     return result;
   }
@@ -145,15 +146,15 @@ Result<bool> wants_keyframes(const PhotoSet& photos, FrameUse use) {
   return use == FrameUse::kKeyframes || (use == FrameUse::kAuto && is_video(photos));
 }
 
-Result<ChosenFrames> choose_keyframes(const PhotoSet& photos,
-                                      const KeyframeOptions& options,
-                                      const StageContext& context) {
+Result<PhotoSet> choose_keyframes(const PhotoSet& photos,
+                                  const KeyframeOptions& options,
+                                  const StageContext& context) {
   TM_CHECK(photos.timestamps.size() == photos.names.size());
   TM_ASSIGN_OR_RETURN(KeyframeSelector selector, KeyframeSelector::create(options));
   VideoReader reader(photos, std::move(selector), context);
   TM_RETURN_IF_ERROR(reader.read_all());
-  ChosenFrames chosen = reader.chosen();
-  if (chosen.photos.names.empty()) {
+  PhotoSet chosen = reader.chosen();
+  if (chosen.names.empty()) {
     return fail(ErrorCode::kInsufficientData,
                 "none of the {} frames of the video is worth keeping; the first: {}. Use all "
                 "frames to try them nevertheless",

@@ -27,18 +27,13 @@ enum class FrameUse {
 /// less after the one before. kInvalidArgument: kKeyframes for pictures without times.
 [[nodiscard]] Result<bool> wants_keyframes(const PhotoSet& photos, FrameUse use);
 
-/// The keyframes of a video, and what became of each of its frames.
-struct ChosenFrames {
-  PhotoSet photos;  ///< reads from the set that it was chosen of, which outlives it
-  std::vector<VideoFrameSection> frames;
-};
-
-/// Looks at all frames in order of time. Frames that cannot be decoded or have another size than
-/// the first stay in the set, without a verdict: a later stage tells why it refuses them.
+/// The keyframes of a video, with what became of each of its frames; it reads from `photos`, which
+/// outlives it. Looks at all frames in order of time. Frames that cannot be decoded or have another
+/// size than the first stay in the set, without a verdict: a later stage tells why it refuses them.
 /// Precondition: `photos` has times. kInvalidArgument: options; kInsufficientData: no frame is
 /// kept; kCancelled.
-[[nodiscard]] Result<ChosenFrames> choose_keyframes(const PhotoSet& photos,
-                                                    const KeyframeOptions& options,
-                                                    const StageContext& context);
+[[nodiscard]] Result<PhotoSet> choose_keyframes(const PhotoSet& photos,
+                                                const KeyframeOptions& options,
+                                                const StageContext& context);
 
 }  // namespace trigmesh

@@ -87,6 +87,31 @@ struct PayloadWriter {
   }
 
   void operator()(const Note& entry) const { out.text(entry.text); }
+
+  void operator()(const FramesJudged& entry) const {
+    out.value(static_cast<std::uint32_t>(entry.frames.size()));
+    for (const FrameJudged& frame : entry.frames) {
+      out.value(frame.sensor_sequence);
+      out.value(static_cast<std::int64_t>(frame.timestamp.count()));
+      out.value(frame.verdict);
+      const FrameMeasures& measures = frame.measures;
+      for (const double value : {measures.sharpness,
+                                 measures.relative_sharpness,
+                                 measures.brightness,
+                                 measures.motion_deg,
+                                 measures.parallax_deg,
+                                 measures.overlap}) {
+        out.value(value);
+      }
+    }
+  }
+
+  void operator()(const FrameMapped& entry) const {
+    out.value(entry.number);
+    out.value(entry.following);
+    out.value(static_cast<std::int64_t>(entry.duration.count()));
+    out.value(entry.waiting);
+  }
 };
 
 /// BinaryReader with the checks that values need; `valid` is false after a value that cannot be.
@@ -132,6 +157,8 @@ class PayloadReader {
     valid_ = valid_ && characters.size() <= kMaxJournalTextBytes;
     return characters;
   }
+
+  [[nodiscard]] bool is_valid() const { return valid_ && in_.ok(); }
 
   [[nodiscard]] bool complete() const { return valid_ && in_.complete(); }
 
@@ -185,6 +212,32 @@ void read(PayloadReader& in, DropCounts& entry) {
 
 void read(PayloadReader& in, Note& entry) {
   entry.text = in.text();
+}
+
+void read(PayloadReader& in, FramesJudged& entry) {
+  const auto count = in.value<std::uint32_t>();
+  for (std::uint32_t i = 0; i < count && i < kMaxJudgedFrames && in.is_valid(); ++i) {
+    FrameJudged& frame = entry.frames.emplace_back();
+    frame.sensor_sequence = in.value<std::uint64_t>();
+    frame.timestamp = in.time();
+    frame.verdict = in.choice(FrameVerdict::kOverBudget);
+    FrameMeasures& measures = frame.measures;
+    for (double* value : {&measures.sharpness,
+                          &measures.relative_sharpness,
+                          &measures.brightness,
+                          &measures.motion_deg,
+                          &measures.parallax_deg,
+                          &measures.overlap}) {
+      *value = in.finite();
+    }
+  }
+}
+
+void read(PayloadReader& in, FrameMapped& entry) {
+  entry.number = in.value<std::uint32_t>();
+  entry.following = in.choice(MapFollowing::kLost);
+  entry.duration = in.time();
+  entry.waiting = in.value<std::uint32_t>();
 }
 
 /// Tries the kinds one after the other until the one with this number.
@@ -243,6 +296,11 @@ std::size_t longest_text(const JournalEntry& entry) {
 
 }  // namespace
 
+std::string_view to_string(MapFollowing following) {
+  constexpr std::array<std::string_view, 3> kNames = {"waiting", "tracked", "lost"};
+  return kNames[static_cast<std::size_t>(following)];
+}
+
 std::string_view to_string(FrameRefusal reason) {
   constexpr std::array<std::string_view, 9> kNames = {"undone",
                                                       "blurred",
@@ -276,6 +334,15 @@ Result<std::vector<std::uint8_t>> encode_record(const JournalRecord& record) {
                 "cannot write a text of {} bytes into the journal: the limit is {}",
                 longest_text(record.entry),
                 kMaxJournalTextBytes);
+  }
+  if (const auto* judged = std::get_if<FramesJudged>(&record.entry);
+      judged != nullptr && judged->frames.size() > kMaxJudgedFrames) {
+    return fail(
+        ErrorCode::kLimitExceeded,
+        "cannot write the verdicts on {} frames into one record of the journal: the limit is "
+        "{}",
+        judged->frames.size(),
+        kMaxJudgedFrames);
   }
   BinaryWriter payload_writer;
   std::visit(PayloadWriter{payload_writer}, record.entry);

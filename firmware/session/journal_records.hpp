@@ -1,11 +1,15 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <variant>
+#include <vector>
+
+#include "sfm/keyframes/frame_verdict.hpp"
 
 namespace trigmesh {
 
@@ -120,6 +124,46 @@ struct Note {
   bool operator==(const Note&) const = default;
 };
 
+/// What the selector of keyframes said of a frame of a stream.
+struct FrameJudged {
+  std::uint64_t sensor_sequence = 0;
+  std::chrono::nanoseconds timestamp{};  ///< middle of the exposure; >= 0
+  FrameVerdict verdict = FrameVerdict::kKept;
+  FrameMeasures measures;
+
+  bool operator==(const FrameJudged&) const = default;
+};
+
+/// Verdicts, in the order in which they became certain: several in a record, at most
+/// kMaxJudgedFrames.
+struct FramesJudged {
+  std::vector<FrameJudged> frames;
+
+  bool operator==(const FramesJudged&) const = default;
+};
+
+inline constexpr std::size_t kMaxJudgedFrames = 1024;
+
+/// How a frame stood to the map that grew while it was captured.
+enum class MapFollowing : std::uint8_t {
+  kWaiting,  ///< no map yet: no parallax so far
+  kTracked,
+  kLost,
+};
+
+/// "waiting", "tracked", "lost".
+[[nodiscard]] std::string_view to_string(MapFollowing following);
+
+/// A kept frame was mapped while the capture went on.
+struct FrameMapped {
+  std::uint32_t number = 0;
+  MapFollowing following = MapFollowing::kTracked;
+  std::chrono::nanoseconds duration{};  ///< of the mapping; >= 0
+  std::uint32_t waiting = 0;            ///< frames that waited to be mapped, then
+
+  bool operator==(const FrameMapped&) const = default;
+};
+
 using JournalEntry = std::variant<EdgeRecord,
                                   FrameKept,
                                   FrameRefused,
@@ -127,7 +171,9 @@ using JournalEntry = std::variant<EdgeRecord,
                                   StateChange,
                                   SettingsUsed,
                                   DropCounts,
-                                  Note>;
+                                  Note,
+                                  FramesJudged,
+                                  FrameMapped>;
 
 /// An entry with the times at which it was written.
 struct JournalRecord {

@@ -21,8 +21,9 @@ Result<std::vector<FolderEntry>> entries_of(FileSystem& files, const fs::path& f
   return *std::move(entries);
 }
 
+/// Also while frames come: a capture is mapped while it goes on.
 bool still_gets_model(SessionState state) {
-  return state == SessionState::kClosed || state == SessionState::kReconstructing;
+  return state != SessionState::kModelReady && state != SessionState::kModelFailed;
 }
 
 }  // namespace

@@ -70,7 +70,7 @@ struct CaptureSettings {
 
   Mode mode = Mode::kVideo;
   VideoTrigger video_trigger = VideoTrigger::kHold;
-  int every_nth_sharp_frame = 5;
+  int every_nth_sharp_frame = 0;
   std::chrono::milliseconds still_wait{2000};
   int queue_frames = 8;
   int jpeg_quality = 95;
@@ -96,6 +96,7 @@ struct ReconstructionSettings {
   enum class Preset { kPreview, kStandard, kFine };
 
   bool enabled = true;
+  bool live = true;
   Preset preset = Preset::kStandard;
   int memory_limit_mb = 0;
   int threads = 0;

@@ -117,9 +117,12 @@ void visit_capture(CaptureSettings& s, Visitor& v) {
       {"video_trigger", "", "hold: while the button is down; toggle: a press begins, one ends"},
       s.video_trigger,
       Choices<2>{"hold", "toggle"});
-  v.whole({"every_nth_sharp_frame", "frames", "In video mode, one of so many sharp frames is kept"},
+  v.whole({"every_nth_sharp_frame",
+           "frames",
+           "In video mode, the sharpest of so many frames is kept; 0: the keyframes, chosen by "
+           "motion, overlap and sharpness"},
           s.every_nth_sharp_frame,
-          {1, 1000});
+          {0, 1000});
   v.time(
       {"still_wait_ms", "ms", "How long a press waits for its frame"}, s.still_wait, {50, 60'000});
   v.whole(
@@ -157,6 +160,10 @@ template <typename Visitor>
 void visit_reconstruction(ReconstructionSettings& s, Visitor& v) {
   v.section("reconstruction", "How models are made after a capture.");
   v.truth({"enabled", "", "false: sessions are only kept"}, s.enabled);
+  v.truth({"live",
+           "",
+           "Videos are mapped while they are captured, and the operator is told what to do"},
+          s.live);
   v.choice(
       {"preset", "", "Time against detail"}, s.preset, Choices<3>{"preview", "standard", "fine"});
   v.whole(

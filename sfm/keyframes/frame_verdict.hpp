@@ -34,6 +34,8 @@ struct FrameMeasures {
   /// due to a change of place.
   double parallax_deg = 0.0;
   double overlap = 1.0;  ///< share of the last keyframe's corners that are still followed
+
+  bool operator==(const FrameMeasures&) const = default;
 };
 
 }  // namespace trigmesh

@@ -26,6 +26,8 @@ constexpr double kBlurriestShare = 0.1;
 /// Mean difference of grey values below which two frames are the same picture: sensor noise alone
 /// is above.
 constexpr double kDuplicateDifference = 0.05;
+constexpr double kLeastFocalRatio = 0.2;
+constexpr double kMostFocalRatio = 10.0;
 /// A picture with fewer corners is too dark or too blurred to go on from.
 constexpr std::size_t kFewestCorners = 16;
 
@@ -81,9 +83,13 @@ Result<> check_range(const char* name, double value, double min, double max) {
 
 }  // namespace
 
+double focal_ratio_of(double focal_px, int longer_side_px) {
+  return std::clamp(focal_px / std::max(longer_side_px, 1), kLeastFocalRatio, kMostFocalRatio);
+}
+
 Result<> KeyframeOptions::validate() const {
   TM_RETURN_IF_ERROR(check_range("image_side_px", image_side_px, 64, 2000));
-  TM_RETURN_IF_ERROR(check_range("focal_ratio", focal_ratio, 0.2, 10.0));
+  TM_RETURN_IF_ERROR(check_range("focal_ratio", focal_ratio, kLeastFocalRatio, kMostFocalRatio));
   TM_RETURN_IF_ERROR(check_range("min_motion_deg", min_motion_deg, 1e-3, 30.0));
   TM_RETURN_IF_ERROR(check_range("max_motion_deg", max_motion_deg, min_motion_deg, 90.0));
   TM_RETURN_IF_ERROR(check_range("slow_motion_deg", slow_motion_deg, 1e-4, min_motion_deg));

@@ -54,6 +54,9 @@ struct KeyframeOptions {
   [[nodiscard]] Result<> validate() const;
 };
 
+/// KeyframeOptions::focal_ratio of a lens, held within what is allowed.
+[[nodiscard]] double focal_ratio_of(double focal_px, int longer_side_px);
+
 /// A frame as the selector looks at it.
 struct VideoFrame {
   std::uint64_t id = 0;                  ///< the caller's; comes back in the decision

@@ -36,15 +36,16 @@ ModelAnswer make_model(Session session, int threads, std::optional<Stage> killed
   const SteadyClock clock;
   std::promise<ModelAnswer> answered;
   auto answer = answered.get_future();
-  ModelWorker worker(
-      options_with(threads),
-      clock,
-      [&](const ModelAnswer& told) { answered.set_value(told); },
-      [&](const std::string& /*session*/, const Progress& progress) {
-        if (progress.stage == killed_at) {
-          (void)::kill(::getpid(), SIGKILL);
-        }
-      });
+  ModelWorker worker(options_with(threads),
+                     clock,
+                     {.on_answer = [&](const ModelAnswer& told) { answered.set_value(told); },
+                      .on_progress =
+                          [&](const std::string& /*session*/, const Progress& progress) {
+                            if (progress.stage == killed_at) {
+                              (void)::kill(::getpid(), SIGKILL);
+                            }
+                          },
+                      .on_followed = {}});
   worker.begin(std::move(session));
   return answer.get();
 }

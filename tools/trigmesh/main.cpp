@@ -14,6 +14,7 @@ namespace {
 
 constexpr const char* kFooter = R"(Examples:
   trigmesh reconstruct photos --output out
+  trigmesh replay 20261125T145054Z-3fa9c1 --output again --verify
   trigmesh calibrate photos --board 9x6 --square 25mm --output camera.toml
   trigmesh evaluate out --truth truth/images.txt
   trigmesh export out --format colmap-binary --output out/colmap
@@ -35,6 +36,7 @@ Exit codes:
 
 void add_all_commands(CLI::App& app, trigmesh::CommandContext& context) {
   trigmesh::add_reconstruct_command(app, context);
+  trigmesh::add_replay_command(app, context);
   trigmesh::add_surface_commands(app, context);
   trigmesh::add_calibrate_command(app, context);
   trigmesh::add_evaluate_command(app, context);

@@ -11,8 +11,7 @@
 #include "sfm/exchange/camera_profile.hpp"
 #include "sfm/exchange/model_folder.hpp"
 #include "tools/trigmesh/command.hpp"
-#include "tools/trigmesh/interrupt.hpp"
-#include "tools/trigmesh/progress_printer.hpp"
+#include "tools/trigmesh/reconstruct_run.hpp"
 #include "tools/trigmesh/surface_arguments.hpp"
 
 namespace trigmesh {
@@ -81,25 +80,6 @@ Result<ReconstructionOptions> options_from(const ReconstructArguments& arguments
   return options;
 }
 
-void print_summary(const ReconstructionReport& report, const std::string& output) {
-  fmt::print("{}\n", report.verdict_sentence);
-  for (const ImageReport& image : report.images) {
-    if (image.reason != RefusalReason::kNone) {
-      fmt::print("  refused {}: {} - {}\n", image.name, to_string(image.reason), image.detail);
-    }
-  }
-  for (const ReportNote& note : report.notes) {
-    fmt::print("  {}: {}\n", to_string(note.severity), note.text);
-  }
-  fmt::print(
-      "{} points, mean reprojection error {:.2f} px\nresult in {}/model, open "
-      "{}/model/report.html\n",
-      report.overall.points,
-      report.overall.mean_error_px,
-      output,
-      output);
-}
-
 Result<> run(const ReconstructArguments& arguments) {
   TM_ASSIGN_OR_RETURN(const ReconstructionOptions options, options_from(arguments));
   TM_ASSIGN_OR_RETURN(
@@ -107,25 +87,8 @@ Result<> run(const ReconstructArguments& arguments) {
       open_photos(arguments.input,
                   arguments.grouping == "folder" ? Subfolders::kInclude : Subfolders::kIgnore,
                   arguments.no_masks ? MaskUse::kIgnore : MaskUse::kUse));
-  const SteadyClock clock;
-  const InterruptWatch interrupt;
-  std::optional<ReconstructionSummary> summary;
-  {
-    ProgressPrinter printer(arguments.surface.quiet ? ProgressPrinter::Style::kQuiet
-                                                    : ProgressPrinter::style_of_stderr(),
-                            clock);
-    TM_ASSIGN_OR_RETURN(
-        summary, reconstruct(photos, arguments.output, options, clock, printer, interrupt.token()));
-  }
-  print_summary(summary->report, arguments.output);
-  if (summary->report.components.empty()) {
-    return fail(ErrorCode::kInsufficientData,
-                "no model could be made from {}; {}/model/report.html tells why for each "
-                "photograph and what to do",
-                arguments.input,
-                arguments.output);
-  }
-  return {};
+  return run_reconstruction(
+      {photos, options, arguments.input, arguments.output, arguments.surface.quiet});
 }
 
 }  // namespace

@@ -1,10 +1,11 @@
-// The frames of a video in order of time: what became of each, how sharp it was.
+// The frames of a video in order of time: what became of each, how sharp it was, how its mapping kept up.
 
 import { h, s, section } from './dom.js';
 import { count, fixed, plural } from './format.js';
 
 const WIDTH = 1000;
 const HEIGHT = 150;
+const ROW_HEIGHT = 44;
 const MARGIN = { left: 8, right: 8, top: 8, bottom: 26 };
 const KEPT = 'kept';
 // In the order of the legend; the class names of styles.css.
@@ -35,6 +36,31 @@ function timeAxis(end, x) {
   return ticks;
 }
 
+/** A row under the frames: one value of each frame that was mapped while it was captured; null when there is none. */
+function liveRow(frames, x, { title, unit, digits, valueOf }, tooltip) {
+  const mapped = frames.filter((frame) => frame.live);
+  if (mapped.length === 0) return null;
+  const most = Math.max(...mapped.map(valueOf));
+  const scale = most > 0 ? (ROW_HEIGHT - 4) / most : 0;
+  const marks = mapped.map((frame) => {
+    const height = Math.max(1, valueOf(frame) * scale);
+    const text = `${frame.name}, ${fixed(frame.time_s, 2)} s: ${frame.live.following}`;
+    const show = (event) => tooltip.show(event.clientX, event.clientY, text, `${title} ${fixed(valueOf(frame), digits)}${unit}`);
+    return s('rect', { class: `live live-${frame.live.following}`, x: x(frame.time_s) - 2, width: 4, y: ROW_HEIGHT - height, height, onpointermove: show, onpointerleave: () => tooltip.hide() });
+  });
+  return h(
+    'figure',
+    { class: 'plot timeline' },
+    h('figcaption', null, `${title}, at most ${fixed(most, digits)}${unit}`),
+    s('svg', { viewBox: `0 0 ${WIDTH} ${ROW_HEIGHT}`, role: 'img', 'aria-label': `${title}, at most ${fixed(most, digits)}${unit}` }, marks),
+  );
+}
+
+const LIVE_ROWS = [
+  { title: 'Mapping of each keyframe while it was captured', unit: ' ms', digits: 0, valueOf: (frame) => 1000 * frame.live.seconds },
+  { title: 'Keyframes that waited to be mapped', unit: '', digits: 0, valueOf: (frame) => frame.live.waiting },
+];
+
 /** Null when the input was no video. */
 export function buildTimeline(report, tooltip) {
   const frames = report.frames ?? [];
@@ -60,5 +86,6 @@ export function buildTimeline(report, tooltip) {
       s('svg', { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: 'img', 'aria-label': `${count(kept)} of ${count(frames.length)} frames of the video kept` }, bars, timeAxis(end, x)),
       legend(frames),
     ),
+    LIVE_ROWS.map((row) => liveRow(frames, x, row, tooltip)),
   );
 }

@@ -55,7 +55,7 @@ PhotoSet video_of(const std::vector<Encoded>& files, milliseconds interval = mil
   return photos;
 }
 
-Result<ChosenFrames> choose(const PhotoSet& photos, int threads, std::stop_token stop = {}) {
+Result<PhotoSet> choose(const PhotoSet& photos, int threads, std::stop_token stop = {}) {
   const test_support::TemporaryFolder temporary;
   const auto checkpoints = CheckpointFolder::open(temporary.path());
   Silence silence;
@@ -63,7 +63,7 @@ Result<ChosenFrames> choose(const PhotoSet& photos, int threads, std::stop_token
   return choose_keyframes(photos, {}, {pool, *checkpoints, silence, stop});
 }
 
-std::vector<std::string> verdicts_of(const ChosenFrames& chosen) {
+std::vector<std::string> verdicts_of(const PhotoSet& chosen) {
   std::vector<std::string> verdicts;
   for (const VideoFrameSection& frame : chosen.frames) {
     verdicts.push_back(frame.name + " " + std::string(to_string(frame.verdict)));
@@ -106,18 +106,18 @@ TEST(ChooseKeyframes, KeepsFewOfManyAndSaysWhatBecameOfEach) {
   ASSERT_TRUE(chosen) << chosen.error().message;
   EXPECT_THAT(chosen->frames, SizeIs(30));
   EXPECT_NEAR(chosen->frames.back().time_s, 29 * 0.033, 1e-9);
-  const std::size_t kept = chosen->photos.names.size();
+  const std::size_t kept = chosen->names.size();
   EXPECT_GT(kept, 3U);
   EXPECT_LT(kept, 20U);
-  EXPECT_THAT(chosen->photos.timestamps, SizeIs(kept));
-  EXPECT_THAT(chosen->photos.description,
+  EXPECT_THAT(chosen->timestamps, SizeIs(kept));
+  EXPECT_THAT(chosen->description,
               HasSubstr("pan, " + std::to_string(kept) + " of 30 frames kept"));
   std::size_t position = 0;
   for (std::size_t i = 0; i < files.size(); ++i) {
     if (chosen->frames[i].verdict == FrameVerdict::kKept) {
       ASSERT_LT(position, kept);
-      EXPECT_EQ(chosen->photos.names[position], video.names[i]);
-      EXPECT_EQ(*chosen->photos.read(position), files[i]);
+      EXPECT_EQ(chosen->names[position], video.names[i]);
+      EXPECT_EQ(*chosen->read(position), files[i]);
       ++position;
     }
   }
@@ -136,7 +136,7 @@ TEST(ChooseKeyframes, LeavesFramesThatAreNoPictureToTheNextStage) {
   const PhotoSet video = video_of(files);
   const auto chosen = choose(video, 1);
   ASSERT_TRUE(chosen) << chosen.error().message;
-  EXPECT_THAT(chosen->photos.names, ElementsAre("0.jpg", "1.jpg"));
+  EXPECT_THAT(chosen->names, ElementsAre("0.jpg", "1.jpg"));
   EXPECT_THAT(verdicts_of(*chosen), ElementsAre("0.jpg kept", "2.jpg duplicate"));
 }
 
@@ -148,10 +148,10 @@ TEST(ChooseKeyframes, ReadsTheMaskOfTheFrameThatWasKept) {
   };
   const auto chosen = choose(video, 1);
   ASSERT_TRUE(chosen) << chosen.error().message;
-  const std::size_t last = chosen->photos.names.size() - 1;
-  const auto mask = chosen->photos.read_mask(last);
+  const std::size_t last = chosen->names.size() - 1;
+  const auto mask = chosen->read_mask(last);
   ASSERT_TRUE(mask && *mask);
-  EXPECT_EQ(std::to_string((**mask)[0]) + ".jpg", chosen->photos.names[last]);
+  EXPECT_EQ(std::to_string((**mask)[0]) + ".jpg", chosen->names[last]);
 }
 
 TEST(ChooseKeyframes, StopsWhenAsked) {

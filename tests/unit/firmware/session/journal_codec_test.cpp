@@ -14,14 +14,18 @@ using ::testing::HasSubstr;
 
 std::vector<JournalEntry> one_of_each_kind() {
   FrameMetadata metadata{nanoseconds(123), nanoseconds(10'000'000), 2.5, std::nullopt, 77};
-  return {EdgeRecord{EdgeDirection::kRelease, nanoseconds(5)},
-          FrameKept{3, 1000, 0xABCDEF, metadata},
-          FrameRefused{FrameRefusal::kBlurred, 0, 78, 0.25},
-          KeyframeChosen{3},
-          StateChange{SessionState::kClosed, "long press"},
-          SettingsUsed{"[capture]\nmode = 'still'\n", 42},
-          DropCounts{1, 2, 3},
-          Note{"hello"}};
+  return {
+      EdgeRecord{EdgeDirection::kRelease, nanoseconds(5)},
+      FrameKept{3, 1000, 0xABCDEF, metadata},
+      FrameRefused{FrameRefusal::kBlurred, 0, 78, 0.25},
+      KeyframeChosen{3},
+      StateChange{SessionState::kClosed, "long press"},
+      SettingsUsed{"[capture]\nmode = 'still'\n", 42},
+      DropCounts{1, 2, 3},
+      Note{"hello"},
+      FramesJudged{{{77, nanoseconds(5), FrameVerdict::kTooFast, {12.5, 0.5, 90.0, 3.0, 1.0, 0.25}},
+                    {78, nanoseconds(6), FrameVerdict::kKept, {}}}},
+      FrameMapped{4, MapFollowing::kLost, nanoseconds(30'000'000), 2}};
 }
 
 JournalRecord record_of(JournalEntry entry) {

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <future>
 #include <map>
 #include <optional>
@@ -62,21 +63,26 @@ std::map<std::string, std::string> files_of(const fs::path& folder) {
   return files;
 }
 
+ModelListeners listening(std::function<void(const ModelAnswer&)> on_answer) {
+  return {.on_answer = std::move(on_answer), .on_progress = {}, .on_followed = {}};
+}
+
 /// A worker that is asked to stop when a stage begins, if one is given.
 class Work {
  public:
   explicit Work(const ModelWorkerOptions& options = quick_options(),
                 std::optional<Stage> stop_at = {})
       : stop_at_(stop_at),
-        worker_(
-            options,
-            clock_,
-            [this](const ModelAnswer& answer) { answered_.set_value(answer); },
-            [this](const std::string& /*session*/, const Progress& progress) {
-              if (progress.stage == stop_at_) {
-                worker_.request_stop();
-              }
-            }) {}
+        worker_(options,
+                clock_,
+                {.on_answer = [this](const ModelAnswer& answer) { answered_.set_value(answer); },
+                 .on_progress =
+                     [this](const std::string& /*session*/, const Progress& progress) {
+                       if (progress.stage == stop_at_) {
+                         worker_.request_stop();
+                       }
+                     },
+                 .on_followed = {}}) {}
 
   ModelAnswer make(Session session) {
     answered_ = {};
@@ -178,8 +184,9 @@ TEST(ModelWorker, LooksAtAStopThatCameBeforeItBegan) {
   const SteadyClock clock;
   std::promise<ModelAnswer> answered;
   {
-    ModelWorker worker(
-        quick_options(), clock, [&](const ModelAnswer& answer) { answered.set_value(answer); });
+    ModelWorker worker(quick_options(), clock, listening([&](const ModelAnswer& answer) {
+                         answered.set_value(answer);
+                       }));
     worker.request_stop();  // nothing: idle
     worker.begin(store.open(id));
     worker.request_stop();
@@ -193,8 +200,9 @@ TEST(ModelWorker, EndingTheWorkerCancelsAndAnswers) {
   const SteadyClock clock;
   std::promise<ModelAnswer> answered;
   {
-    ModelWorker worker(
-        quick_options(), clock, [&](const ModelAnswer& answer) { answered.set_value(answer); });
+    ModelWorker worker(quick_options(), clock, listening([&](const ModelAnswer& answer) {
+                         answered.set_value(answer);
+                       }));
     worker.begin(store.open(id));
   }
   EXPECT_EQ(answered.get_future().get().outcome, ModelOutcome::kCancelled);
@@ -213,13 +221,15 @@ TEST(ModelWorker, WorksWithLessPriorityThanItsMaker) {
   ModelWorker worker(
       options,
       clock,
-      [&](const ModelAnswer&) { done.set_value(); },
-      [&](const std::string&, const Progress& progress) {
-        // The first word comes from the worker's own thread, before others begin.
-        if (progress.stage == Stage::kMap && !std::exchange(told, true)) {
-          seen.set_value(::getpriority(PRIO_PROCESS, static_cast<id_t>(::gettid())));
-        }
-      });
+      {.on_answer = [&](const ModelAnswer&) { done.set_value(); },
+       .on_progress =
+           [&](const std::string&, const Progress& progress) {
+             // The first word comes from the worker's own thread, before others begin.
+             if (progress.stage == Stage::kMap && !std::exchange(told, true)) {
+               seen.set_value(::getpriority(PRIO_PROCESS, static_cast<id_t>(::gettid())));
+             }
+           },
+       .on_followed = {}});
   worker.begin(store.open(id));
   EXPECT_EQ(seen.get_future().get(), 17);
   EXPECT_LT(::getpriority(PRIO_PROCESS, static_cast<id_t>(::gettid())), 17);

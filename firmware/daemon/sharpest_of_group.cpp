@@ -1,10 +1,10 @@
-#include "firmware/daemon/stream_selector.hpp"
+#include "firmware/daemon/sharpest_of_group.hpp"
 
 #include <utility>
 
 namespace trigmesh {
 
-void StreamSelector::begin(std::chrono::nanoseconds from) {
+void SharpestOfGroup::begin(std::chrono::nanoseconds from) {
   is_streaming_ = true;
   from_ = from;
   in_group_ = 0;
@@ -12,19 +12,19 @@ void StreamSelector::begin(std::chrono::nanoseconds from) {
   counts_ = {};
 }
 
-std::optional<TimedFrame> StreamSelector::offer(const Frame& frame,
+StreamChoice SharpestOfGroup::offer(const Frame& frame,
                                                 const FrameTimes& times,
                                                 std::uint64_t sequence) {
   if (times.end < from_) {
-    return std::nullopt;
+    return {};
   }
   ++counts_.seen;
   ++in_group_;
   compare(frame, times, sequence);
-  return in_group_ == group_size_ ? finish_group() : std::nullopt;
+  return in_group_ == group_size_ ? finish_group() : StreamChoice{};
 }
 
-void StreamSelector::compare(const Frame& frame, const FrameTimes& times, std::uint64_t sequence) {
+void SharpestOfGroup::compare(const Frame& frame, const FrameTimes& times, std::uint64_t sequence) {
   double sharpness = 0.0;
   if (group_size_ > 1) {
     const Result<double> measured = meter_.measure(frame.info().layout, frame.bytes());
@@ -35,7 +35,7 @@ void StreamSelector::compare(const Frame& frame, const FrameTimes& times, std::u
     sharpness = *measured;
   }
   if (best_ && sharpness <= best_sharpness_) {
-    ++counts_.less_sharp;
+    ++counts_.not_chosen;
     return;
   }
   Frame copy = copies_.copy(frame, sequence);
@@ -43,25 +43,30 @@ void StreamSelector::compare(const Frame& frame, const FrameTimes& times, std::u
     ++counts_.no_buffer;
     return;
   }
-  counts_.less_sharp += best_ ? 1U : 0U;
+  counts_.not_chosen += best_ ? 1U : 0U;
   best_ = TimedFrame{std::move(copy), times, sequence};
   best_sharpness_ = sharpness;
 }
 
-std::optional<TimedFrame> StreamSelector::finish_group() {
+StreamChoice SharpestOfGroup::finish_group() {
   in_group_ = 0;
-  counts_.kept += best_ ? 1U : 0U;
-  return std::exchange(best_, std::nullopt);
+  StreamChoice choice;
+  if (best_) {
+    ++counts_.kept;
+    choice.kept.push_back(*std::move(best_));
+    best_.reset();
+  }
+  return choice;
 }
 
-std::optional<TimedFrame> StreamSelector::end() {
+StreamChoice SharpestOfGroup::end() {
   is_streaming_ = false;
   if (2 * in_group_ >= group_size_ || counts_.kept == 0) {
     return finish_group();
   }
-  counts_.less_sharp += best_ ? 1U : 0U;
+  counts_.not_chosen += best_ ? 1U : 0U;
   best_.reset();
-  return std::nullopt;
+  return {};
 }
 
 }  // namespace trigmesh

@@ -1,4 +1,4 @@
-#include "firmware/daemon/stream_selector.hpp"
+#include "firmware/daemon/sharpest_of_group.hpp"
 
 #include <chrono>
 #include <vector>
@@ -15,89 +15,90 @@ using std::chrono::milliseconds;
 using ::testing::ElementsAre;
 
 /// Offers frames of these contrasts at 0, 10, 20 ms .. and ends; the sequences that are kept.
-std::vector<std::uint64_t> kept(StreamSelector& selector, const std::vector<int>& contrasts) {
+std::vector<std::uint64_t> kept(SharpestOfGroup& selector, const std::vector<int>& contrasts) {
   test_support::TestFrames frames;
   std::vector<std::uint64_t> sequences;
   for (std::uint64_t i = 0; i < contrasts.size(); ++i) {
     const Frame frame = frames.make(static_cast<std::uint8_t>(contrasts[i]));
-    if (const auto one = selector.offer(frame, test_support::at(i * milliseconds(10)), i)) {
-      sequences.push_back(one->sequence);
+    for (const TimedFrame& one :
+         selector.offer(frame, test_support::at(i * milliseconds(10)), i).kept) {
+      sequences.push_back(one.sequence);
     }
   }
-  if (const auto last = selector.end()) {
-    sequences.push_back(last->sequence);
+  for (const TimedFrame& last : selector.end().kept) {
+    sequences.push_back(last.sequence);
   }
   return sequences;
 }
 
-TEST(StreamSelector, KeepsTheSharpestOfEachGroup) {
+TEST(SharpestOfGroup, KeepsTheSharpestOfEachGroup) {
   FrameCopies copies(4);
-  StreamSelector selector(3, copies);
+  SharpestOfGroup selector(3, copies);
   selector.begin(milliseconds(0));
   EXPECT_THAT(kept(selector, {10, 50, 20, 40, 30, 20}), ElementsAre(1, 3));
   EXPECT_EQ(selector.counts().seen, 6U);
   EXPECT_EQ(selector.counts().kept, 2U);
-  EXPECT_EQ(selector.counts().less_sharp, 4U);
+  EXPECT_EQ(selector.counts().not_chosen, 4U);
 }
 
-TEST(StreamSelector, TheFirstOfEquallySharpOnesIsKept) {
+TEST(SharpestOfGroup, TheFirstOfEquallySharpOnesIsKept) {
   FrameCopies copies(4);
-  StreamSelector selector(3, copies);
+  SharpestOfGroup selector(3, copies);
   selector.begin(milliseconds(0));
   EXPECT_THAT(kept(selector, {10, 10, 10}), ElementsAre(0));
 }
 
-TEST(StreamSelector, GroupsOfOneKeepEverything) {
+TEST(SharpestOfGroup, GroupsOfOneKeepEverything) {
   FrameCopies copies(4);
-  StreamSelector selector(1, copies);
+  SharpestOfGroup selector(1, copies);
   selector.begin(milliseconds(0));
   EXPECT_THAT(kept(selector, {10, 5, 20}), ElementsAre(0, 1, 2));
 }
 
-TEST(StreamSelector, ALastGroupCountsFromHalfItsFramesOn) {
+TEST(SharpestOfGroup, ALastGroupCountsFromHalfItsFramesOn) {
   FrameCopies copies(4);
-  StreamSelector selector(4, copies);
+  SharpestOfGroup selector(4, copies);
   selector.begin(milliseconds(0));
   EXPECT_THAT(kept(selector, {10, 50, 20, 10, 90}), ElementsAre(1));
   selector.begin(milliseconds(0));
   EXPECT_THAT(kept(selector, {10, 50, 20, 10, 90, 20}), ElementsAre(1, 4));
 }
 
-TEST(StreamSelector, AShortStreamKeepsOne) {
+TEST(SharpestOfGroup, AShortStreamKeepsOne) {
   FrameCopies copies(4);
-  StreamSelector selector(10, copies);
+  SharpestOfGroup selector(10, copies);
   selector.begin(milliseconds(0));
   EXPECT_THAT(kept(selector, {10}), ElementsAre(0));
 }
 
-TEST(StreamSelector, FramesFromBeforeTheStreamDoNotBelongToIt) {
+TEST(SharpestOfGroup, FramesFromBeforeTheStreamDoNotBelongToIt) {
   FrameCopies copies(4);
-  StreamSelector selector(1, copies);
+  SharpestOfGroup selector(1, copies);
   selector.begin(milliseconds(15));
   EXPECT_THAT(kept(selector, {10, 10, 10}), ElementsAre(2));
 }
 
-TEST(StreamSelector, CountsWhatHasNoBuffer) {
+TEST(SharpestOfGroup, CountsWhatHasNoBuffer) {
   FrameCopies copies(1);
   const Frame held = copies.copy(test_support::TestFrames().make(0), 0);
-  StreamSelector selector(1, copies);
+  SharpestOfGroup selector(1, copies);
   selector.begin(milliseconds(0));
   EXPECT_TRUE(kept(selector, {10, 10}).empty());
   EXPECT_EQ(selector.counts().no_buffer, 2U);
 }
 
-TEST(StreamSelector, CountsDamagedFrames) {
+TEST(SharpestOfGroup, CountsDamagedFrames) {
   FrameCopies copies(2);
-  StreamSelector selector(2, copies);
+  SharpestOfGroup selector(2, copies);
   selector.begin(milliseconds(0));
   auto pool = std::make_shared<SlotPool>(1, nullptr);
   const std::size_t slot = *pool->take();
   FrameInfo info;
   info.layout.format = PixelFormat::kJpeg;
   const Frame damaged(info, pool->bytes(slot), pool, slot);
-  EXPECT_FALSE(selector.offer(damaged, test_support::at(milliseconds(1)), 1));
+  EXPECT_TRUE(selector.offer(damaged, test_support::at(milliseconds(1)), 1).kept.empty());
   EXPECT_EQ(selector.counts().damaged, 1U);
-  EXPECT_FALSE(selector.end());
+  EXPECT_TRUE(selector.end().kept.empty());
 }
 
 }  // namespace

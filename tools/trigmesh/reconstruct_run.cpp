@@ -1,0 +1,58 @@
+#include "tools/trigmesh/reconstruct_run.hpp"
+
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "firmware/base/check.hpp"
+#include "tools/trigmesh/interrupt.hpp"
+#include "tools/trigmesh/progress_printer.hpp"
+
+namespace trigmesh {
+
+namespace {
+
+void print_summary(const ReconstructionReport& report, const std::string& output) {
+  fmt::print("{}\n", report.verdict_sentence);
+  for (const ImageReport& image : report.images) {
+    if (image.reason != RefusalReason::kNone) {
+      fmt::print("  refused {}: {} - {}\n", image.name, to_string(image.reason), image.detail);
+    }
+  }
+  for (const ReportNote& note : report.notes) {
+    fmt::print("  {}: {}\n", to_string(note.severity), note.text);
+  }
+  fmt::print(
+      "{} points, mean reprojection error {:.2f} px\nresult in {}/model, open "
+      "{}/model/report.html\n",
+      report.overall.points,
+      report.overall.mean_error_px,
+      output,
+      output);
+}
+
+}  // namespace
+
+Result<> run_reconstruction(const ReconstructRun& run) {
+  const SteadyClock clock;
+  const InterruptWatch interrupt;
+  std::optional<ReconstructionSummary> summary;
+  {
+    ProgressPrinter printer(
+        run.quiet ? ProgressPrinter::Style::kQuiet : ProgressPrinter::style_of_stderr(), clock);
+    TM_ASSIGN_OR_RETURN(
+        summary,
+        reconstruct(run.photos, run.output, run.options, clock, printer, interrupt.token()));
+  }
+  print_summary(summary->report, run.output);
+  if (summary->report.components.empty()) {
+    return fail(ErrorCode::kInsufficientData,
+                "no model could be made from {}; {}/model/report.html tells why for each "
+                "photograph and what to do",
+                run.input,
+                run.output);
+  }
+  return {};
+}
+
+}  // namespace trigmesh

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <string>
+
+#include "firmware/base/result.hpp"
+#include "firmware/pipeline/photo_set.hpp"
+#include "firmware/pipeline/reconstruction.hpp"
+
+namespace trigmesh {
+
+/// A reconstruction from the command line.
+struct ReconstructRun {
+  const PhotoSet& photos;
+  const ReconstructionOptions& options;
+  const std::string& input;   ///< as the user called it
+  const std::string& output;  ///< folder
+  bool quiet = false;
+};
+
+/// Makes it with progress on stderr, Ctrl-C ends it in order, and prints what it came to. Errors:
+/// those of reconstruct(); kInsufficientData also when there is no model.
+[[nodiscard]] Result<> run_reconstruction(const ReconstructRun& run);
+
+}  // namespace trigmesh
