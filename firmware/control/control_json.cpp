@@ -48,6 +48,7 @@ std::string render_status(const ControlStatus& status) {
   json["storage"] = to_string(status.storage);
   json["session"] = status.session_id;
   json["frames"] = status.frames;
+  json["advice"] = status.advice;
   json["job"] = to_string(status.job);
   json["queued_models"] = status.queued_models;
   json["available_bytes"] = status.available_bytes;

@@ -172,6 +172,7 @@ Result<ControlStatus> parse_status(std::string_view json) {
       fields.choice("storage", {StorageLevel::kOk, StorageLevel::kLow, StorageLevel::kFull});
   status.session_id = fields.text("session");
   status.frames = fields.count<std::uint32_t>("frames");
+  status.advice = fields.text("advice");
   status.job = fields.choice(
       "job", {JobState::kNone, JobState::kRunning, JobState::kPausing, JobState::kPaused});
   status.queued_models = fields.count<std::uint32_t>("queued_models");

@@ -193,6 +193,12 @@ class ControlServer::Impl {
         return render_sessions(sessions);
       }));
     });
+    server_.Post("/v1/sessions/([^/]+)/continue",
+                 [this](const httplib::Request& request, httplib::Response& response) {
+                   const std::string id = request.matches[1];
+                   answer_done(response,
+                               check_id(id).and_then([&] { return target_.continue_session(id); }));
+                 });
     server_.Post("/v1/sessions/([^/]+)/export",
                  [this](const httplib::Request& request, httplib::Response& response) {
                    answer(response, export_session(request.matches[1], request.body));

@@ -57,6 +57,9 @@ class ControlTarget {
   /// Begins a session, and in video mode the stream. An Error says why not (kInsufficientData: not
   /// now; kNoSpace).
   [[nodiscard]] virtual Result<> start() = 0;
+  /// Opens a closed session again and goes on as start() does. kInvalidArgument (no id, another
+  /// camera profile), kNotFound, kInsufficientData: not now, or its model is being made.
+  [[nodiscard]] virtual Result<> continue_session(const std::string& id) = 0;
   /// Closes the session.
   [[nodiscard]] virtual Result<> finish() = 0;
   /// One frame now.

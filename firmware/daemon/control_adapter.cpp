@@ -45,6 +45,13 @@ Result<> ControlAdapter::command(CommandKind kind) {
   });
 }
 
+Result<> ControlAdapter::continue_session(const std::string& id) {
+  return wait_for_answer<void>(patience_, [&](auto answer) {
+    (void)parts_.rig.push(
+        Command{CommandKind::kContinue, parts_.clock.now(), std::move(answer), id});
+  });
+}
+
 Result<std::vector<SessionInfo>> ControlAdapter::sessions() {
   return wait_for_answer<std::vector<SessionInfo>>(
       patience_, [&](auto answer) { parts_.storage.push(ListOrder{std::move(answer)}); });

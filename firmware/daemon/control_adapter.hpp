@@ -48,6 +48,7 @@ class ControlAdapter final : public ControlTarget {
 
   [[nodiscard]] Result<> cancel_model() override { return command(CommandKind::kCancelModel); }
 
+  [[nodiscard]] Result<> continue_session(const std::string& id) override;
   [[nodiscard]] Result<std::vector<SessionInfo>> sessions() override;
   [[nodiscard]] Result<> remove_session(const std::string& id) override;
   [[nodiscard]] Result<ExportReport> export_session(

@@ -121,6 +121,19 @@ Result<std::string> FrameStore::begin_session() {
   return session_->manifest().id;
 }
 
+Result<std::string> FrameStore::continue_session(const std::string& id) {
+  TM_ASSIGN_OR_RETURN(Session::Opened opened, store_->open_session(id));
+  if (opened.session.manifest().camera_profile != options_.session.camera_profile) {
+    return fail(ErrorCode::kInvalidArgument,
+                "cannot continue session {}: it was captured with another camera profile than the "
+                "settings name now",
+                id);
+  }
+  TM_RETURN_IF_ERROR(opened.session.reopen("continued by the operator"));
+  session_.emplace(std::move(opened.session));
+  return id;
+}
+
 Result<std::uint32_t> FrameStore::add_frame(const TimedFrame& timed) {
   const FrameLayout& layout = timed.frame.info().layout;
   if (layout.format == PixelFormat::kJpeg) {

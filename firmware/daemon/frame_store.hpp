@@ -65,6 +65,11 @@ class FrameStore {
   /// Its id. Precondition: is_open(). kNoSpace, kIo.
   [[nodiscard]] Result<std::string> begin_session();
 
+  /// Opens a closed session again for more frames; its id. Precondition: is_open(), nobody uses it.
+  /// kNotFound, kCorruptData, kNoSpace, kIo; kInvalidArgument: it was captured with another camera
+  /// profile.
+  [[nodiscard]] Result<std::string> continue_session(const std::string& id);
+
   // The open session. Precondition of all but has_session: has_session().
   [[nodiscard]] bool has_session() const { return session_.has_value(); }
 

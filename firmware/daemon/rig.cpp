@@ -143,6 +143,9 @@ void Rig::hear(CameraChanged& input) {
 void Rig::hear(SessionOpened& input) {
   if (is_current(input.serial)) {
     session_id_ = input.id;
+    if (input.frames > 0) {
+      advance(SessionContinued{input.frames}, parts_.clock.now());
+    }
     answer(on_opened_, {});
   }
 }
@@ -298,6 +301,9 @@ void Rig::hear(Command& input) {
     case CommandKind::kStart:
       ask(StartRequest{}, input);
       break;
+    case CommandKind::kContinue:
+      continue_session(input);
+      break;
     case CommandKind::kFinish:
       ask(FinishRequest{}, input);
       break;
@@ -315,9 +321,28 @@ void Rig::hear(Command& input) {
 
 void Rig::ask(const RigEvent& event, Command& command) {
   asking_ = std::move(command.answer);
-  asks_to_start_ = command.kind == CommandKind::kStart;
+  asks_to_start_ = command.kind == CommandKind::kStart || command.kind == CommandKind::kContinue;
   advance(event, command.time);
   answer(asking_, {});  // nobody has to be waited for
+}
+
+void Rig::continue_session(Command& command) {
+  const bool waits =
+      std::find(waiting_models_.begin(), waiting_models_.end(), command.session_id) !=
+      waiting_models_.end();
+  if (state_.session_open || waits || command.session_id == model_id_) {
+    answer(
+        command.answer,
+        fail(ErrorCode::kInsufficientData,
+             "cannot continue session {} now: {}",
+             command.session_id,
+             state_.session_open ? "a session is open; finish it first"
+                                 : "its model is being made or waits for it; cancel it, or wait"));
+    return;
+  }
+  continued_id_ = command.session_id;
+  ask(StartRequest{}, command);
+  continued_id_.clear();
 }
 
 void Rig::cancel_model(Command& command) {
@@ -359,7 +384,7 @@ void Rig::act(const OpenSession& /*action*/) {
   session_id_.clear();
   guide_.begin();
   told_advice_ = Advice::kNone;
-  parts_.storage.push(OpenSessionOrder{serial_});
+  parts_.storage.push(OpenSessionOrder{serial_, continued_id_});
   (void)parts_.capture.push(HoldCamera{serial_});
   for (const EdgeRecord& edge : std::exchange(recent_edges_, {})) {
     if (edge.kernel_time >= event_time_) {  // of the press that began it

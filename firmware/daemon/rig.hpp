@@ -77,6 +77,7 @@ class Rig {
 
   /// A command for the state machine.
   void ask(const RigEvent& event, Command& command);
+  void continue_session(Command& command);
   void cancel_model(Command& command);
   void press(const Press& press);
   void presses_by_time();
@@ -122,6 +123,7 @@ class Rig {
   SessionSerial serial_{};  ///< of the session that was opened last
   std::string session_id_;  ///< empty until it is open
   std::uint64_t next_ticket_ = 1;
+  std::string continued_id_;    ///< of the session that is opened next; empty: a new one
   CommandAnswer asking_;        ///< of the command whose step is being done
   bool asks_to_start_ = false;  ///< that command waits until the session is open
   CommandAnswer on_opened_;

@@ -33,6 +33,7 @@ struct CameraChanged {
 struct SessionOpened {
   SessionSerial serial{};
   std::string id;
+  std::uint32_t frames = 0;  ///< that it has already: it is continued
 };
 
 /// It could not be begun, or can take nothing any more.
@@ -79,7 +80,7 @@ struct ModelsWaiting {
   std::vector<std::string> ids;
 };
 
-enum class CommandKind : std::uint8_t { kStart, kFinish, kStill, kUndo, kCancelModel };
+enum class CommandKind : std::uint8_t { kStart, kContinue, kFinish, kStill, kUndo, kCancelModel };
 
 using CommandAnswer = std::function<void(Result<>)>;
 
@@ -88,6 +89,7 @@ struct Command {
   CommandKind kind = CommandKind::kStart;
   std::chrono::nanoseconds time{};  ///< when it was asked for
   CommandAnswer answer;
+  std::string session_id{};  ///< of kContinue
 };
 
 /// The program shall end.

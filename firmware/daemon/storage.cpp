@@ -137,10 +137,15 @@ void Storage::do_order(OpenSessionOrder order) {
     return;
   }
   drops_at_begin_ = parts_.drops.now();
-  const Result<std::string> id = store_.begin_session();
+  const Result<std::string> id = order.continued_id.empty()
+                                     ? store_.begin_session()
+                                     : check_unused(order.continued_id).and_then([&] {
+                                         return store_.continue_session(order.continued_id);
+                                       });
   if (!id) {
     (void)parts_.rig.push(SessionLost{order.serial, id.error()});
-    if (is_about_disk(id.error())) {
+    const bool names_a_session = !order.continued_id.empty();  // which may simply not be there
+    if (is_about_disk(id.error()) && !names_a_session) {
       disk_failed(id.error());
     } else {
       check_level();
@@ -149,7 +154,8 @@ void Storage::do_order(OpenSessionOrder order) {
   }
   write_log(LogLevel::kInfo, "session begins", {{"session", *id}});
   tell_capture_began();
-  (void)parts_.rig.push(SessionOpened{order.serial, *id});
+  (void)parts_.rig.push(SessionOpened{
+      order.serial, *id, static_cast<std::uint32_t>(store_.session().frames().size())});
 }
 
 void Storage::do_order(RecordOrder order) {
@@ -190,6 +196,9 @@ void Storage::tell_capture_began() {
   const Session& session = store_.session();
   tell_capture(CaptureBegan{
       session.manifest().id, session.work_folder(), session.manifest().camera_profile});
+  for (const FrameKept& frame : session.frames()) {  // of a session that is continued
+    tell_capture(CaptureFrame{frame.number, session.frame_path(frame.number)});
+  }
 }
 
 void Storage::tell_capture_ended() {
@@ -272,7 +281,8 @@ void Storage::do_order(CloseOrder order) {
   }
   const std::string id = store_.session().manifest().id;
   tell_capture_ended();
-  const bool keeps = order.end == SessionEnd::kKeep;
+  // A session that was continued for nothing has its earlier frames.
+  const bool keeps = order.end == SessionEnd::kKeep || !store_.session().frames().empty();
   const auto done =
       keeps ? store_.close_session(order.why, drops_of_session()) : store_.discard_session();
   if (done) {

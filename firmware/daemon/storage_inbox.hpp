@@ -24,6 +24,7 @@ namespace trigmesh {
 
 struct OpenSessionOrder {
   SessionSerial serial{};
+  std::string continued_id{};  ///< a closed session that is continued; empty: a new one
 };
 
 /// Into the journal of the open session; when none is open it is left out.

@@ -236,8 +236,8 @@ Result<std::vector<PairRecord>> match(const Run& run,
                                       const PhotoFeatures& features,
                                       const StageContext& context) {
   const ReconstructionOptions& options = run.options;
-  const bool follows_walk =
-      run.photos.is_walk && options.pair_mode == PairMode::kAuto && !options.poses;
+  const bool is_walk = run.photos.is_walk || options.frames == FrameUse::kWalk;
+  const bool follows_walk = is_walk && options.pair_mode == PairMode::kAuto && !options.poses;
   auto pairs =
       follows_walk
           ? match_walk(features.images, features.cameras, walk_matching_options(options), context)

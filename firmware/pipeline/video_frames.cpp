@@ -20,7 +20,8 @@ constexpr std::chrono::milliseconds kLongestVideoInterval{100};
 // Frames decoded before the selector looks at them in turn: enough to keep all threads at work.
 constexpr std::size_t kBatch = 16;
 
-constexpr std::array kFrameUses{FrameUse::kAuto, FrameUse::kAll, FrameUse::kKeyframes};
+constexpr std::array kFrameUses{
+    FrameUse::kAuto, FrameUse::kAll, FrameUse::kKeyframes, FrameUse::kWalk};
 
 bool is_video(const PhotoSet& photos) {
   if (photos.timestamps.size() < 2) {
@@ -127,9 +128,11 @@ std::string_view to_string(FrameUse use) {
     case FrameUse::kAll:
       return "all";
     case FrameUse::kKeyframes:
+      return "keyframes";
+    case FrameUse::kWalk:
       break;
   }
-  return "keyframes";
+  return "walk";
 }
 
 std::optional<FrameUse> frame_use_from_string(std::string_view name) {

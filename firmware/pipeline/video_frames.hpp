@@ -17,9 +17,10 @@ enum class FrameUse {
   kAuto,       ///< the keyframes of a video, all of anything else
   kAll,        ///< every picture
   kKeyframes,  ///< the keyframes, however far in time the pictures are from each other
+  kWalk,       ///< every picture: they are the keyframes of a walk, in its order
 };
 
-/// "auto", "all", "keyframes".
+/// "auto", "all", "keyframes", "walk".
 [[nodiscard]] std::string_view to_string(FrameUse use);
 [[nodiscard]] std::optional<FrameUse> frame_use_from_string(std::string_view name);
 

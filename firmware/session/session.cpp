@@ -147,6 +147,10 @@ Result<> Session::change_state(SessionState state, const std::string& why) {
   return write_manifest(*context_.files, folder_, manifest_);
 }
 
+Result<> Session::reopen(const std::string& why) {
+  return accepts_frames() ? Result<>() : change_state(SessionState::kCapturing, why);
+}
+
 Result<> Session::close(const std::string& why) {
   if (manifest_.state == SessionState::kClosed) {
     return {};

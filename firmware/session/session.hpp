@@ -80,6 +80,10 @@ class Session {
   /// close(). kNoSpace, kIo.
   [[nodiscard]] Result<> set_state(SessionState state, const std::string& why);
 
+  /// Takes frames again, after the last one; its model, if it has one, stays until the next is in
+  /// its place. kNoSpace, kIo.
+  [[nodiscard]] Result<> reopen(const std::string& why);
+
   /// No more frames; writes the frame table. Again: no failure. kNoSpace, kIo.
   [[nodiscard]] Result<> close(const std::string& why);
 

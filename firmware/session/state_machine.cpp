@@ -100,6 +100,8 @@ class Stepper {
     }
   }
 
+  void operator()(const SessionContinued& event) { state_.frames += event.frames; }
+
   void operator()(const StartRequest&) {
     if (const auto reason = why_not_capture()) {
       refuse(*reason);

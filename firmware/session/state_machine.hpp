@@ -73,6 +73,11 @@ struct UndoFailed {};  ///< answers UndoLastFrame: the frame is still there
 /// belongs to it follows. What it has is safe, the next start of the program closes it.
 struct SessionFailed {};
 
+/// The session that was opened had frames already: it is continued.
+struct SessionContinued {
+  std::uint32_t frames = 0;
+};
+
 struct CameraLost {};
 
 struct CameraBack {};
@@ -112,6 +117,7 @@ using RigEvent = std::variant<Press,
                               FrameUndone,
                               UndoFailed,
                               SessionFailed,
+                              SessionContinued,
                               CameraLost,
                               CameraBack,
                               StorageChanged,

@@ -26,6 +26,7 @@ using Json = nlohmann::json;
 
 class DaemonProgram : public ScratchTest {
  protected:
+  /// Without models, unless `more` begins with another [reconstruction].
   void write_settings(const std::string& more = "") {
     std::ofstream(path("rig.toml"))
         << "[camera]\nbackend = \"replay\"\ndevice = \""
@@ -33,7 +34,7 @@ class DaemonProgram : public ScratchTest {
         << "[trigger]\nbackend = \"none\"\n[indicator]\nbackend = \"none\"\n"
         << "[capture]\nevery_nth_sharp_frame = 1\n"
         << "[storage]\nreserve_mb = 10\nwarn_mb = 10\nroot = \"" << path("sessions") << "\"\n"
-        << "[reconstruction]\nenabled = false\n"
+        << (more.starts_with("[reconstruction]") ? "" : "[reconstruction]\nenabled = false\n")
         << more;
   }
 
@@ -119,6 +120,59 @@ TEST_F(DaemonProgram, CapturesASessionWithUntouchedBytes) {
   for (const auto& [name, bytes] : kept) {
     EXPECT_TRUE(pictures.contains(bytes)) << name;
   }
+}
+
+constexpr const char* kQuickModels =
+    "[reconstruction]\npreset = \"preview\"\nthreads = 2\npriority = 0\n";
+
+TEST_F(DaemonProgram, MapsACaptureWhileItGoesOnAndReplayMakesTheSameModel) {
+  write_settings(kQuickModels);
+  start();
+  await("camera", "true");
+  post("/v1/start");
+  await("map", "tracked");
+  await("frame", "\"frames\":14}");
+  post("/v1/finish");
+  await("model", "ready");
+  stop();
+  const std::string session = only_session().string();
+  const ProgramResult same = run_trigmesh(
+      {"replay", session, "--output", path("again"), "--threads", "1", "--quiet", "--verify"},
+      std::chrono::seconds(120));
+  EXPECT_EQ(same.exit_code, 0) << same.err;
+  EXPECT_THAT(same.out, HasSubstr("identical to"));
+  // A model that was changed is noticed.
+  std::ofstream(fs::path(session) / "model/sparse.ply", std::ios::app) << "x";
+  const ProgramResult other =
+      run_trigmesh({"replay", session, "--output", path("again"), "--quiet", "--verify"},
+                   std::chrono::seconds(120));
+  EXPECT_EQ(other.exit_code, 4);
+  EXPECT_THAT(other.err, HasSubstr("1 files: sparse.ply"));
+}
+
+TEST_F(DaemonProgram, ASessionIsContinuedByCommand) {
+  write_settings(kQuickModels);
+  start();
+  await("camera", "true");
+  post("/v1/start");
+  await("frame", "\"frames\":8}");
+  post("/v1/finish");
+  await("model", "\"session\"");
+  const std::string id = only_session().filename().string();
+  const ProgramResult continued = run_trigmesh({"continue", id, "--socket", path("control")});
+  EXPECT_EQ(continued.exit_code, 0) << continued.err;
+  await("frame", "\"frames\":14}");
+  post("/v1/finish");
+  await("model", "ready");
+  const ProgramResult unknown =
+      run_trigmesh({"continue", "20200101T000000Z-000000", "--socket", path("control")});
+  EXPECT_EQ(unknown.exit_code, 3) << unknown.err;
+  stop();
+  EXPECT_EQ(
+      run_trigmesh({"replay", only_session().string(), "-o", path("again"), "--quiet", "--verify"},
+                   std::chrono::seconds(120))
+          .exit_code,
+      0);
 }
 
 TEST_F(DaemonProgram, AStillIsAnsweredWhenItIsStored) {

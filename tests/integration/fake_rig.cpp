@@ -52,6 +52,13 @@ Result<std::vector<SessionInfo>> FakeRig::sessions() {
   return std::vector{ready, closed};
 }
 
+Result<> FakeRig::continue_session(const std::string& id) {
+  if (id != kReadySession && id != kClosedSession) {
+    return fail(ErrorCode::kNotFound, "there is no session {}", id);
+  }
+  return command("continue " + id);
+}
+
 Result<> FakeRig::remove_session(const std::string& id) {
   if (id != kReadySession && id != kClosedSession) {
     return fail(ErrorCode::kNotFound, "there is no session {}", id);

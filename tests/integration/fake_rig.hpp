@@ -34,6 +34,7 @@ class FakeRig final : public ControlTarget {
   Result<> cancel_model() override { return command("cancel"); }
 
   Result<std::vector<SessionInfo>> sessions() override;
+  Result<> continue_session(const std::string& id) override;
   Result<> remove_session(const std::string& id) override;
   Result<ExportReport> export_session(const std::string& id,
                                       const std::filesystem::path& destination) override;

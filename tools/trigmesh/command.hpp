@@ -26,6 +26,7 @@ void finish_command(CommandContext& context, const Result<>& result);
 // here and name it in add_all_commands (main.cpp). `context` outlives the parsing.
 
 void add_reconstruct_command(CLI::App& app, CommandContext& context);
+void add_continue_command(CLI::App& app, CommandContext& context);
 void add_replay_command(CLI::App& app, CommandContext& context);
 /// densify, mesh and texture.
 void add_surface_commands(CLI::App& app, CommandContext& context);

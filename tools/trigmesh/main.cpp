@@ -43,6 +43,7 @@ void add_all_commands(CLI::App& app, trigmesh::CommandContext& context) {
   trigmesh::add_export_command(app, context);
   trigmesh::add_status_command(app, context);
   trigmesh::add_trigger_command(app, context);
+  trigmesh::add_continue_command(app, context);
   trigmesh::add_record_command(app, context);
   trigmesh::add_watch_command(app, context);
   trigmesh::add_sessions_command(app, context);

@@ -130,8 +130,10 @@ void add_reconstruct_command(CLI::App& app, CommandContext& context) {
   command
       ->add_option("--frames",
                    arguments->frames,
-                   "Which frames of a recording are used; auto: the keyframes of a video")
-      ->check(CLI::IsMember({"auto", "all", "keyframes"}))
+                   "Which frames of a recording are used; auto: the keyframes of a video; walk: "
+                   "all, which are "
+                   "the keyframes of a walk in their order")
+      ->check(CLI::IsMember({"auto", "all", "keyframes", "walk"}))
       ->capture_default_str();
   command->add_option("--match", arguments->match, "Which photographs are compared")
       ->check(CLI::IsMember({"auto", "sequential", "retrieval", "exhaustive"}))

@@ -41,6 +41,9 @@ void print(const ControlStatus& status) {
   fmt::print("rig       {}, {}\n",
              to_string(status.phase),
              status.camera_present ? "camera is there" : "no camera");
+  if (!status.advice.empty()) {
+    fmt::print("advice    {}\n", status.advice);
+  }
   if (!status.fault.empty()) {
     fmt::print("fault     {}\n", status.fault);
   }

@@ -18,11 +18,12 @@ TEST(ControlJson, SaysWhatTheRigDoes) {
   status.queued_models = 1;
   status.available_bytes = 5;
   status.software_version = "1.0";
-  EXPECT_EQ(render_status(status),
-            R"({"phase":"capturing","camera_present":true,"storage":"low",)"
-            R"("session":"20240229T235959Z-00ff00","frames":3,"job":"paused","queued_models":1,)"
-            R"("available_bytes":5,"software_version":"1.0","session_root":"","fault":"","model_session":"",)"
-            R"("model_stage":"","model_done":0,"model_total":0,"last_event":0})");
+  EXPECT_EQ(
+      render_status(status),
+      R"({"phase":"capturing","camera_present":true,"storage":"low",)"
+      R"("session":"20240229T235959Z-00ff00","frames":3,"advice":"","job":"paused","queued_models":1,)"
+      R"("available_bytes":5,"software_version":"1.0","session_root":"","fault":"","model_session":"",)"
+      R"("model_stage":"","model_done":0,"model_total":0,"last_event":0})");
 }
 
 TEST(ControlJson, ListsSessions) {

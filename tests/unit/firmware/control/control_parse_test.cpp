@@ -19,6 +19,7 @@ TEST(ControlParse, ReadsTheStatusThatTheServerWrites) {
   status.storage = StorageLevel::kFull;
   status.session_id = "20240229T235959Z-00ff00";
   status.frames = 7;
+  status.advice = "too fast";
   status.job = JobState::kPausing;
   status.available_bytes = std::uint64_t{1} << 40U;
   status.fault = "no camera";

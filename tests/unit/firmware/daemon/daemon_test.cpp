@@ -1,5 +1,6 @@
 // The rig as the operator meets it: presses in, sessions on disk.
 
+#include <algorithm>
 #include <chrono>
 #include <string>
 
@@ -55,6 +56,106 @@ TEST_F(Video, TheJournalTellsEdgesFramesAndStates) {
   EXPECT_GE(edges, 3U) << "all but perhaps the last";
   EXPECT_EQ(frames, sessions()[0].manifest.frame_count);
   EXPECT_TRUE(has_counts);
+}
+
+TEST_F(Video, TheMakerOfModelsHearsOfTheCaptureFrameByFrame) {
+  start_daemon();
+  await("camera", "true");
+  press_and_release();
+  await("frame", "\"frames\":2}");
+  press_and_release();
+  await("phase", "working");
+  const auto news = models_.news();
+  ASSERT_GE(news.size(), 4U);
+  EXPECT_EQ(news.front(), "began");
+  EXPECT_EQ(news[1], "frame 1");
+  EXPECT_EQ(news[2], "frame 2");
+  EXPECT_EQ(news.back(), "ended");
+}
+
+TEST_F(Video, AdviceFollowsTheMapAndIsShownAndWrittenDown) {
+  start_daemon();
+  await("camera", "true");
+  press_and_release();
+  await("frame", "\"frames\":2}");
+  MapFollowed map;
+  map.photographs = 8;
+  map.tracked = 6;
+  for (std::uint32_t number = 1; number <= 2; ++number) {
+    map.frame = {number, MapFollowing::kLost, milliseconds(30), 0};
+    models_.tell(map);
+  }
+  await("map", "\"following\":\"lost\"");
+  await("advice", "go back");
+  await_that([&] { return !status().advice.empty(); });
+  EXPECT_THAT(status().advice, HasSubstr("last good view"));
+  map.frame.following = MapFollowing::kTracked;
+  models_.tell(map);
+  await("advice", "none");
+  await_that([&] { return status().advice.empty(); });
+  press_and_release();
+  await("phase", "working");
+  std::size_t mapped = 0;
+  bool has_advice = false;
+  for (const JournalRecord& record : journal_of(sessions()[0].manifest.id)) {
+    mapped += std::holds_alternative<FrameMapped>(record.entry) ? 1U : 0U;
+    const auto* note = std::get_if<Note>(&record.entry);
+    has_advice = has_advice || (note != nullptr && note->text.starts_with("advice: lost"));
+  }
+  EXPECT_EQ(mapped, 3U);
+  EXPECT_TRUE(has_advice);
+}
+
+TEST_F(Video, AClosedSessionIsContinuedAndItsModelMadeAnew) {
+  start_daemon();
+  await("camera", "true");
+  press_and_release();
+  await("frame", "\"frames\":2}");
+  press_and_release();
+  await("phase", "working");
+  const std::string id = sessions()[0].manifest.id;
+  EXPECT_EQ(control().continue_session(id).error().code, ErrorCode::kInsufficientData)
+      << "its model is being made";
+  models_.finish(ModelOutcome::kReady);
+  await("phase", "idle");
+  const std::uint32_t before = sessions()[0].manifest.frame_count;
+  ASSERT_TRUE(control().continue_session(id));
+  await("phase", "capturing");
+  await_that([&] { return status().frames > before; });
+  press_and_release();
+  await("phase", "working");
+  ASSERT_EQ(sessions().size(), 1U);
+  EXPECT_GT(sessions()[0].manifest.frame_count, before);
+  EXPECT_THAT(models_.begun(), ElementsAre(id, id));
+  const auto news = models_.news();
+  EXPECT_EQ(std::count(news.begin(), news.end(), "frame 1"), 2) << "also the earlier ones";
+}
+
+TEST_F(Video, OnlyASessionThatIsThereIsContinued) {
+  start_daemon();
+  await("camera", "true");
+  EXPECT_EQ(control().continue_session("20200101T000000Z-000000").error().code,
+            ErrorCode::kNotFound);
+  press_and_release();
+  await("frame", "\"frames\":1}");
+  EXPECT_EQ(control().continue_session("20200101T000000Z-000000").error().code,
+            ErrorCode::kInsufficientData)
+      << "a session is open";
+  press_and_release();
+  await("phase", "working");
+}
+
+TEST_F(Video, ASessionContinuedWithoutANewFrameStays) {
+  const std::string id = leave_session({SessionState::kClosed, SessionState::kModelReady}, 3);
+  start_daemon();
+  await("camera", "true");
+  camera_->is_hanging = true;
+  ASSERT_TRUE(control().continue_session(id));
+  ASSERT_TRUE(control().finish());
+  camera_->is_hanging = false;
+  await("phase", "working");
+  ASSERT_EQ(sessions().size(), 1U);
+  EXPECT_GE(sessions()[0].manifest.frame_count, 3U);
 }
 
 TEST_F(Video, HoldKeepsFramesWhileTheButtonIsDown) {

@@ -44,6 +44,23 @@ class ModelScript {
     return begun_;
   }
 
+  /// What was told of captures: "began", "frame 1", "undone", "ended".
+  [[nodiscard]] std::vector<std::string> news() const {
+    const std::lock_guard lock(mutex_);
+    return news_;
+  }
+
+  /// Tells the rig how a frame of its open session was mapped.
+  void tell(MapFollowed map) {
+    std::function<void(const MapFollowed&)> on_followed;
+    {
+      const std::lock_guard lock(mutex_);
+      map.session_id = capture_id_;
+      on_followed = on_followed_;
+    }
+    on_followed(map);
+  }
+
   std::atomic<std::uint64_t> progress = 0;
 
  private:
@@ -63,7 +80,10 @@ class ModelScript {
   std::optional<Session> session_;  ///< guarded by mutex_, as what follows
   SessionState before_ = SessionState::kClosed;
   std::function<void(ModelAnswer)> answer_;
+  std::function<void(const MapFollowed&)> on_followed_;
   std::vector<std::string> begun_;
+  std::string capture_id_;
+  std::vector<std::string> news_;
 };
 
 /// A maker of models that makes none: it ends when the test or a stop says so.
@@ -72,6 +92,7 @@ class MockModelMaker final : public ModelMaker {
   MockModelMaker(ModelObserver observer, ModelScript& script) : script_(script) {
     const std::lock_guard lock(script_.mutex_);
     script_.answer_ = std::move(observer.on_answer);
+    script_.on_followed_ = std::move(observer.on_followed);
   }
 
   void begin(Session session) override {
@@ -80,6 +101,18 @@ class MockModelMaker final : public ModelMaker {
     script_.begun_.push_back(session.manifest().id);
     (void)session.set_state(SessionState::kReconstructing, "begun");
     script_.session_.emplace(std::move(session));
+  }
+
+  void follow(CaptureNews news) override {
+    const std::lock_guard lock(script_.mutex_);
+    if (const auto* begin = std::get_if<CaptureBegan>(&news)) {
+      script_.capture_id_ = begin->session_id;
+      script_.news_.emplace_back("began");
+    } else if (const auto* frame = std::get_if<CaptureFrame>(&news)) {
+      script_.news_.push_back("frame " + std::to_string(frame->number));
+    } else {
+      script_.news_.emplace_back(std::holds_alternative<CaptureUndone>(news) ? "undone" : "ended");
+    }
   }
 
   void request_stop() override { script_.finish(ModelOutcome::kCancelled); }

@@ -72,7 +72,8 @@ std::vector<std::string> verdicts_of(const PhotoSet& chosen) {
 }
 
 TEST(FrameUse, NamesComeBack) {
-  for (const FrameUse use : {FrameUse::kAuto, FrameUse::kAll, FrameUse::kKeyframes}) {
+  for (const FrameUse use :
+       {FrameUse::kAuto, FrameUse::kAll, FrameUse::kKeyframes, FrameUse::kWalk}) {
     EXPECT_EQ(frame_use_from_string(to_string(use)), use);
   }
   EXPECT_FALSE(frame_use_from_string("some"));

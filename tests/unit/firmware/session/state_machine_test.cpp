@@ -97,6 +97,15 @@ TEST(StateMachine, DiscardsASessionWithoutFrames) {
   EXPECT_THAT(rig.on(press(PressKind::kLong)), ElementsAre("discard"));
 }
 
+TEST(StateMachine, KeepsASessionThatWasContinuedForNothing) {
+  Rig rig(kToggle);
+  EXPECT_THAT(rig.on(StartRequest{}), ElementsAre("open", "stream"));
+  EXPECT_THAT(rig.on(SessionContinued{12}), IsEmpty());
+  EXPECT_EQ(rig.state.frames, 12U);
+  EXPECT_THAT(rig.on(FinishRequest{}), ElementsAre("stop stream"));
+  EXPECT_THAT(rig.on(StreamEnded{}), ElementsAre("close", "queue", "start job"));
+}
+
 TEST(StateMachine, StreamsWhileTheButtonIsHeld) {
   Rig rig(kHold);
   EXPECT_THAT(rig.on(press(PressKind::kDown)), ElementsAre("open", "stream"));
