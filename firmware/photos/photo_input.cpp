@@ -19,8 +19,7 @@ namespace {
 Result<> tell_of_session(const std::filesystem::path& session,
                          PhotoSet& photos,
                          std::string& title) {
-  RealFileSystem files;
-  const auto manifest = read_manifest(files, session);
+  const auto manifest = read_manifest(real_file_system(), session);
   if (!manifest && manifest.error().code == ErrorCode::kNotFound) {
     return {};
   }

@@ -67,8 +67,8 @@ VideoFrameSection section_of(const FrameJudged& frame, const CaptureRecords& rec
 }  // namespace
 
 Result<std::vector<VideoFrameSection>> read_session_frames(const std::filesystem::path& session) {
-  RealFileSystem files;
-  TM_ASSIGN_OR_RETURN(const JournalScan scan, read_journal(files, session / kJournalName));
+  TM_ASSIGN_OR_RETURN(const JournalScan scan,
+                      read_journal(real_file_system(), session / kJournalName));
   CaptureRecords records;
   for (const JournalRecord& record : scan.records) {
     std::visit(records, record.entry);

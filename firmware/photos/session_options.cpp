@@ -60,8 +60,7 @@ Result<std::vector<Camera>> cameras_of_profile(const std::string& profile,
 
 Result<ReconstructionOptions> options_of_session(const std::filesystem::path& session,
                                                  const std::string& software_version) {
-  RealFileSystem files;
-  TM_ASSIGN_OR_RETURN(const SessionManifest manifest, read_manifest(files, session));
+  TM_ASSIGN_OR_RETURN(const SessionManifest manifest, read_manifest(real_file_system(), session));
   TM_ASSIGN_OR_RETURN(
       const Settings settings,
       parse_settings(manifest.settings, fmt::format("settings of session {}", manifest.id)));

@@ -14,8 +14,8 @@
 #include "firmware/base/check.hpp"
 #include "firmware/daemon/frame_copies.hpp"
 #include "firmware/daemon/frame_store.hpp"
+#include "firmware/daemon/sharpest_of_group.hpp"
 #include "firmware/daemon/still_shelf.hpp"
-#include "firmware/daemon/stream_selector.hpp"
 #include "sfm/exchange/image_codec.hpp"
 #include "tests/conformance/allocation_counter.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -108,7 +108,7 @@ void hold_last_frames(benchmark::State& state) {
 /// Video mode: the sharpest of five is chosen; nothing is stored.
 void choose_among_frames(benchmark::State& state) {
   FrameCopies copies(16);
-  StreamSelector selector(5, copies);
+  SharpestOfGroup selector(5, copies);
   selector.begin({});
   measure(state, [&](const Frame& frame, std::uint64_t sequence) {
     benchmark::DoNotOptimize(selector.offer(frame, at(sequence), sequence));

@@ -86,33 +86,42 @@ RunningService::RunningService(const std::vector<std::string>& command,
                                const std::filesystem::path& notify_socket,
                                const std::filesystem::path& log,
                                std::chrono::microseconds watchdog)
-    : notify_(listen_at(notify_socket)), process_([&] {
+    : notify_(listen_at(notify_socket)),
+      process_([&] {
         pid_ = spawn(command, environment_with(notify_socket, watchdog), log);
         return static_cast<int>(::syscall(SYS_pidfd_open, pid_, 0));
-      }()) {}
+      }()),
+      reader_([this] { listen(); }) {}
 
 RunningService::~RunningService() {
   if (pid_ > 0) {
     (void)::kill(pid_, SIGKILL);
     (void)::waitpid(pid_, nullptr, 0);
   }
+  // Ends the reader's recv; a datagram socket without a peer says so and does it nevertheless.
+  (void)::shutdown(notify_.get(), SHUT_RD);
 }
 
-bool RunningService::await_told(const std::string& text, std::chrono::seconds limit) {
-  const auto deadline = Clock::now() + limit;
+/// All the time: a service whose manager does not listen waits in the end.
+void RunningService::listen() {
   std::array<char, 4096> message;
-  pollfd entry{notify_.get(), POLLIN, 0};
-  while (told_.find(text) == std::string::npos) {
-    if (::poll(&entry, 1, milliseconds_until(deadline)) <= 0) {
-      return false;
-    }
+  while (true) {
     const ssize_t size = ::recv(notify_.get(), message.data(), message.size(), 0);
-    if (size > 0) {
+    if (size <= 0) {
+      return;
+    }
+    {
+      const std::lock_guard lock(mutex_);
       told_.append(message.data(), static_cast<std::size_t>(size));
       told_ += '\n';
     }
+    heard_.notify_all();
   }
-  return true;
+}
+
+bool RunningService::await_told(const std::string& text, std::chrono::seconds limit) {
+  std::unique_lock lock(mutex_);
+  return heard_.wait_for(lock, limit, [&] { return told_.find(text) != std::string::npos; });
 }
 
 void RunningService::send_signal(int number) const {

@@ -1,8 +1,11 @@
 #pragma once
 
 #include <chrono>
+#include <condition_variable>
 #include <filesystem>
+#include <mutex>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <sys/types.h>
@@ -37,10 +40,15 @@ class RunningService {
   [[nodiscard]] int await_end(std::chrono::seconds limit = std::chrono::seconds(60));
 
  private:
+  void listen();
+
   pid_t pid_ = -1;
-  std::string told_;  ///< all messages, a line each
+  std::mutex mutex_;
+  std::condition_variable heard_;
+  std::string told_;  ///< guarded by mutex_: all messages, a line each
   UniqueFd notify_;
   UniqueFd process_;
+  std::jthread reader_;  ///< last: it uses all of the above
 };
 
 }  // namespace trigmesh::test_support

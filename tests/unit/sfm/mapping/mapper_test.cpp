@@ -337,6 +337,45 @@ TEST(Mapper, GivesTheSameBitsWhateverTheOrderOfParallelWork) {
 }
 
 // ---------------------------------------------------------------------------------------------------------------------
+// Frames one by one.
+
+TEST(Mapper, TrackRegistersWhatFitsAndBeginsNothing) {
+  const SyntheticScene scene = make_synthetic_scene({.points = 300, .views = 8, .noise_px = 0.5});
+  SerialExecutor executor;
+  Mapper mapper = make_mapper(scene, IntrinsicsKnowledge::kGiven, executor);
+  EXPECT_EQ(mapper.track(), 0U) << "there is no map";
+  ASSERT_EQ(mapper.step().kind, StepKind::kSeeded);
+  EXPECT_EQ(mapper.track(), 6U);
+  EXPECT_EQ(mapper.registered_count(), 8U);
+  EXPECT_TRUE(mapper.is_registered(ViewId{7}));
+  EXPECT_EQ(mapper.track(), 0U);
+  mapper.finish();
+  expect_one_model_near_truth(mapper, scene, kRotationRad, kPosition);
+}
+
+TEST(Mapper, TellsHowFarAPairLiesFromWhereTheMapExpectsIt) {
+  const SyntheticScene scene = make_synthetic_scene({.points = 300, .views = 8, .noise_px = 0.5});
+  SerialExecutor executor;
+  Mapper mapper = make_mapper(scene, IntrinsicsKnowledge::kGiven, executor);
+  const auto& right = scene.pairs.back();
+  EXPECT_FALSE(mapper.disagreement_deg(right.pair, right.geometry.inliers)) << "no map yet";
+  step_to_the_end(mapper);
+  const auto agreement = mapper.disagreement_deg(right.pair, right.geometry.inliers);
+  ASSERT_TRUE(agreement);
+  EXPECT_LT(*agreement, 0.5);
+  // The same keypoints, each matched with that of another point.
+  std::vector<FeatureMatch> wrong = right.geometry.inliers;
+  for (std::size_t i = 0; i < wrong.size(); ++i) {
+    wrong[i].second = right.geometry.inliers[(i + wrong.size() / 2) % wrong.size()].second;
+  }
+  const auto disagreement = mapper.disagreement_deg(right.pair, wrong);
+  ASSERT_TRUE(disagreement);
+  EXPECT_GT(*disagreement, 5.0);
+  EXPECT_FALSE(mapper.disagreement_deg(right.pair, std::vector(wrong.begin(), wrong.begin() + 3)))
+      << "too few can tell nothing";
+}
+
+// ---------------------------------------------------------------------------------------------------------------------
 // Options.
 
 TEST(MapperOptions, DefaultsAreValid) {
