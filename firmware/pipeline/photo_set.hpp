@@ -25,7 +25,8 @@ struct PhotoSet {
   /// When each was taken, rising, for the frames of a video from which keyframes may be chosen;
   /// empty: every photograph is wanted.
   std::vector<std::chrono::nanoseconds> timestamps{};
-  std::string description;  ///< for the report, e.g. "photo folder, 25 photographs"
+  std::string description;              ///< for the report, e.g. "photo folder, 25 photographs"
+  std::vector<std::string> warnings{};  ///< what is wrong with the input as a whole, for the report
   /// The encoded bytes (JPEG or PNG) of a photograph. Thread-safe.
   std::function<Result<std::vector<std::uint8_t>>(std::size_t)> read;
   /// The encoded mask of a photograph, white = leave out; nothing when it has none. Thread-safe;

@@ -135,6 +135,9 @@ ReconstructionReport report_on(const PhotoSet& photos,
   input.pairs = evidence;
   input.intrinsics_origins = origins;
   input.settings = report_settings(options, plan);
+  for (const std::string& sentence : photos.warnings) {
+    input.notes.push_back({NoteSeverity::kWarning, sentence});
+  }
   for (const std::string& sentence : plan.lowered) {
     input.notes.push_back({NoteSeverity::kWarning, sentence});
   }
@@ -173,6 +176,8 @@ bool is_finished(LastStage last) {
 
 std::string_view to_string(Stage stage) {
   switch (stage) {
+    case Stage::kReadVideo:
+      return "video";
     case Stage::kSelectFrames:
       return "frames";
     case Stage::kExtract:
