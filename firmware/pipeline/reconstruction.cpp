@@ -158,6 +158,7 @@ ReconstructionReport report_on_model(const PhotoSet& photos,
   input.pairs = history.pairs;
   input.intrinsics_origins = history.intrinsics_origins;
   input.settings = history.settings;
+  input.finish = history.finish;
   if (!model.warning.empty()) {
     input.notes.push_back({NoteSeverity::kWarning, model.warning});
   }

@@ -93,6 +93,12 @@ void print_summary(const ReconstructionReport& report, const std::string& output
   for (const ReportNote& note : report.notes) {
     fmt::print("  {}: {}\n", to_string(note.severity), note.text);
   }
+  if (report.finish) {
+    fmt::print("{}\n", report.finish->sentence);
+    for (const FinishGap& gap : report.finish->gaps) {
+      fmt::print("  {}\n", gap.advice);
+    }
+  }
   fmt::print(
       "{} points, mean reprojection error {:.2f} px\nresult in {}/model, open "
       "{}/model/report.html\n",
