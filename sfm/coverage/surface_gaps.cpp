@@ -22,7 +22,7 @@ constexpr double kSubjectRatio = 0.5;
 constexpr double kReliefRatio = 0.75;
 // Pieces are gathered in cubes of this part of the side of a square as large as the subject, but of
 // so many mean faces at least.
-constexpr double kCellRatio = 1.0 / 15.0;
+constexpr double kCellRatio = 1.0 / 30.0;
 constexpr double kCellFaces = 8.0;
 constexpr double kSameDirectionCosine = 0.766;  // 40 degrees
 
