@@ -2,12 +2,10 @@
 
 import { h, section } from './dom.js';
 
-const KIND_WORDS = { hole: 'hole', weak: 'too little seen' };
-
 function gapItem(report, gap, onSelect) {
   const image = report.images.findIndex((candidate) => candidate.name === gap.photograph);
   const show = image < 0 ? null : h('button', { class: 'link', type: 'button', title: 'Show in 3D', onclick: () => onSelect(image) }, 'show the photograph');
-  return h('li', null, h('span', { class: 'badge' }, KIND_WORDS[gap.kind] ?? gap.kind), h('span', null, gap.advice, ' ', show));
+  return h('li', null, gap.advice, ' ', show);
 }
 
 export function buildFinish(report, onSelect) {
@@ -15,7 +13,7 @@ export function buildFinish(report, onSelect) {
   if (!finish) return null;
   return section(
     'finish',
-    'What is missing',
+    'Ready or not',
     h('p', { id: 'finish-verdict', class: finish.ready ? 'finish-ready' : 'finish-not-ready' }, finish.sentence),
     finish.gaps.length === 0 ? null : h('ol', { class: 'gaps' }, finish.gaps.map((gap) => gapItem(report, gap, onSelect))),
   );
