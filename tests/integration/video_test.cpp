@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include <sys/mount.h>
+
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -236,6 +238,19 @@ TEST_F(Video, DoesNotReplaceAFolderOfTheUser) {
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, HasSubstr("was not made from a video"));
   EXPECT_EQ(contents(path("out/frames/mine.txt")), "mine");
+}
+
+TEST_F(Video, SaysBeforehandThatTheDiskIsTooSmall) {
+  fs::create_directories(path("out"));
+  if (::mount("tmpfs", path("out").c_str(), "tmpfs", 0, "size=128k") != 0) {
+    GTEST_SKIP() << "a small file system cannot be mounted here (needs root)";
+  }
+  const ProgramResult result = reconstruct(demo_video("walk.mp4", "select='lt(n,20)'"));
+  const bool is_empty = fs::is_empty(path("out"));
+  EXPECT_EQ(::umount(path("out").c_str()), 0);
+  EXPECT_EQ(result.exit_code, 6) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("MB or more"));
+  EXPECT_TRUE(is_empty);
 }
 
 TEST_F(Video, OpensNothingButItself) {
