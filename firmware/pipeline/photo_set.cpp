@@ -24,6 +24,7 @@ PhotoSet subset(const PhotoSet& photos, const std::vector<std::size_t>& position
   }
   result.ordered = photos.ordered;
   result.description = photos.description;
+  result.warnings = photos.warnings;
   result.read = [&photos, positions](std::size_t i) { return photos.read(positions[i]); };
   if (photos.read_mask) {
     result.read_mask = [&photos, positions](std::size_t i) {

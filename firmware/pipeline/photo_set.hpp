@@ -28,7 +28,8 @@ struct PhotoSet {
   std::vector<std::chrono::nanoseconds> timestamps{};
   /// What was said of the frames of the video that they are from, for the report.
   std::vector<VideoFrameSection> frames{};
-  std::string description;  ///< for the report, e.g. "photo folder, 25 photographs"
+  std::string description;              ///< for the report, e.g. "photo folder, 25 photographs"
+  std::vector<std::string> warnings{};  ///< what is wrong with the input as a whole, for the report
   /// The encoded bytes (JPEG or PNG) of a photograph. Thread-safe.
   std::function<Result<std::vector<std::uint8_t>>(std::size_t)> read;
   /// The encoded mask of a photograph, white = leave out; nothing when it has none. Thread-safe;

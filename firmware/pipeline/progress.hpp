@@ -7,6 +7,7 @@ namespace trigmesh {
 
 /// The stages of a reconstruction, in order.
 enum class Stage {
+  kReadVideo,     ///< video file -> frames
   kSelectFrames,  ///< video -> keyframes
   kExtract,       ///< photographs -> keypoints and descriptors
   kSelectPairs,   ///< which images are worth comparing
@@ -19,8 +20,8 @@ enum class Stage {
   kWrite,         ///< model and report -> files
 };
 
-/// "frames", "features", "pairs", "matching", "mapping", "depth", "fusion", "surface", "texture",
-/// "writing".
+/// "video", "frames", "features", "pairs", "matching", "mapping", "depth", "fusion", "surface",
+/// "texture", "writing".
 [[nodiscard]] std::string_view to_string(Stage stage);
 
 /// How far a stage is. `total` may be 0 while it is not known.

@@ -114,6 +114,9 @@ ReconstructionReport report_on(const PhotoSet& photos,
   input.pairs = evidence;
   input.intrinsics_origins = origins;
   input.settings = report_settings(options, plan);
+  for (const std::string& sentence : photos.warnings) {
+    input.notes.push_back({NoteSeverity::kWarning, sentence});
+  }
   for (const std::string& sentence : plan.lowered) {
     input.notes.push_back({NoteSeverity::kWarning, sentence});
   }
@@ -134,6 +137,7 @@ ReconstructionReport report_on_model(const PhotoSet& photos,
   input.pairs = history.pairs;
   input.intrinsics_origins = history.intrinsics_origins;
   input.settings = history.settings;
+  input.finish = history.finish;
   if (!model.warning.empty()) {
     input.notes.push_back({NoteSeverity::kWarning, model.warning});
   }
@@ -152,6 +156,8 @@ bool is_finished(LastStage last) {
 
 std::string_view to_string(Stage stage) {
   switch (stage) {
+    case Stage::kReadVideo:
+      return "video";
     case Stage::kSelectFrames:
       return "frames";
     case Stage::kExtract:

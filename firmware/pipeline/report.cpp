@@ -369,6 +369,7 @@ ReconstructionReport build_report(const ReportInput& input) {
   report.dense = input.dense;
   report.surface = input.surface;
   report.texture = input.texture;
+  report.finish = input.finish;
   report.reprojection_error_px = empty_histogram(0.0, kErrorBinPx, kErrorBins);
   report.track_length = empty_histogram(kTrackBinStart, 1.0, kTrackBins);
   report.triangulation_angle_deg = empty_histogram(0.0, kAngleBinDeg, kAngleBins);

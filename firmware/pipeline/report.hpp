@@ -86,9 +86,10 @@ struct ReportInput {
   std::string software_version;
   std::string input_description;          ///< e.g. "folder fountain, 11 photographs"
   std::optional<double> metres_per_unit;  ///< > 0, when the scale is known
-  std::optional<DenseSection> dense;      ///< of the main component, like the next two
+  std::optional<DenseSection> dense;      ///< of the main component, like the next three
   std::optional<SurfaceSection> surface;
   std::optional<TextureSection> texture;
+  std::optional<FinishSection> finish;
 };
 
 /// One model: the images that are linked with each other.
@@ -154,6 +155,7 @@ struct ReconstructionReport {
   std::optional<DenseSection> dense;
   std::optional<SurfaceSection> surface;
   std::optional<TextureSection> texture;
+  std::optional<FinishSection> finish;
   std::vector<ReportSetting> settings;
   std::vector<ReportNote>
       notes;  ///< errors first, then warnings, then infos; otherwise in the given order

@@ -38,6 +38,7 @@ constexpr std::array kVerdicts{
     FrameVerdict::kTrackLost,
     FrameVerdict::kOverBudget,
 };
+constexpr std::array kGapKinds{GapKind::kHole, GapKind::kWeak};
 constexpr std::array kOrigins{
     IntrinsicsOrigin::kGiven, IntrinsicsOrigin::kPriorRefined, IntrinsicsOrigin::kSolved};
 
@@ -137,6 +138,33 @@ Result<ReportSetting> parse_setting(const Json& json) {
   return setting;
 }
 
+Result<Eigen::Vector3d> point_of(const Json& object, const char* name) {
+  const auto member = object.find(name);
+  if (member == object.end() || !member->is_array() || member->size() != 3) {
+    return bad_member(name, "is no point");
+  }
+  Eigen::Vector3d point;
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (!(*member)[i].is_number()) {
+      return bad_member(name, "is no point");
+    }
+    point[static_cast<Eigen::Index>(i)] = (*member)[i].get<double>();
+  }
+  return point;
+}
+
+Result<FinishGap> parse_gap(const Json& json) {
+  FinishGap gap;
+  TM_ASSIGN_OR_RETURN(gap.kind, one_of<GapKind>(json, "kind", kGapKinds));
+  TM_ASSIGN_OR_RETURN(gap.center_in_world, point_of(json, "center"));
+  TM_ASSIGN_OR_RETURN(gap.area_ratio, number_of(json, "area_ratio"));
+  TM_ASSIGN_OR_RETURN(gap.photograph, text_of(json, "photograph"));
+  TM_ASSIGN_OR_RETURN(gap.turn_left_deg, number_of(json, "turn_left_deg"));
+  TM_ASSIGN_OR_RETURN(gap.rise_deg, number_of(json, "rise_deg"));
+  TM_ASSIGN_OR_RETURN(gap.advice, text_of(json, "advice"));
+  return gap;
+}
+
 /// Calls `parse` for each element of the array `name`.
 template <typename Parse>
 Result<> for_each_in(const Json& document, const char* name, const Parse& parse) {
@@ -151,6 +179,23 @@ Result<> for_each_in(const Json& document, const char* name, const Parse& parse)
     TM_RETURN_IF_ERROR(parse(element));
   }
   return {};
+}
+
+Result<FinishSection> parse_finish(const Json& json) {
+  FinishSection finish;
+  const auto ready = json.find("ready");
+  if (ready == json.end() || !ready->is_boolean()) {
+    return bad_member("ready", "is not true or false");
+  }
+  finish.ready = ready->get<bool>();
+  TM_ASSIGN_OR_RETURN(finish.sentence, text_of(json, "sentence"));
+  TM_ASSIGN_OR_RETURN(finish.gap_ratio, number_of(json, "gap_ratio"));
+  TM_RETURN_IF_ERROR(for_each_in(json, "gaps", [&](const Json& element) -> Result<> {
+    TM_ASSIGN_OR_RETURN(FinishGap gap, parse_gap(element));
+    finish.gaps.push_back(std::move(gap));
+    return {};
+  }));
+  return finish;
 }
 
 Result<> add_origin(const Json& camera, std::vector<IntrinsicsOrigin>& origins) {
@@ -203,6 +248,9 @@ Result<ReportHistory> parse_report_history(std::string_view json) {
   TM_RETURN_IF_ERROR(for_each_in(document, "cameras", [&](const Json& element) {
     return add_origin(element, history.intrinsics_origins);
   }));
+  if (const auto finish = document.find("finish"); finish != document.end()) {
+    TM_ASSIGN_OR_RETURN(history.finish, parse_finish(*finish));
+  }
   return history;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -16,6 +17,7 @@ struct ReportHistory {
   std::vector<PairEvidence> pairs;                   ///< positions are < images.size()
   std::vector<IntrinsicsOrigin> intrinsics_origins;  ///< per camera group; kSolved where untold
   std::vector<ReportSetting> settings;
+  std::optional<FinishSection> finish;  ///< of the surface, if there was one
   std::string input_description;
 };
 

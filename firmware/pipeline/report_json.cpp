@@ -167,11 +167,26 @@ Json to_json(const DenseSection& dense) {
   };
 }
 
+Json to_json(const Eigen::Vector3d& point) {
+  return {significant(point.x()), significant(point.y()), significant(point.z())};
+}
+
 Json to_json(const OpenHole& hole) {
-  const Eigen::Vector3d& center = hole.center_in_world;
   return {
-      {"center", {significant(center.x()), significant(center.y()), significant(center.z())}},
+      {"center", to_json(hole.center_in_world)},
       {"perimeter", significant(hole.perimeter)},
+  };
+}
+
+Json to_json(const FinishGap& gap) {
+  return {
+      {"kind", to_string(gap.kind)},
+      {"center", to_json(gap.center_in_world)},
+      {"area_ratio", rounded(gap.area_ratio, kPixelDigits)},
+      {"photograph", gap.photograph},
+      {"turn_left_deg", rounded(gap.turn_left_deg, 1)},
+      {"rise_deg", rounded(gap.rise_deg, 1)},
+      {"advice", gap.advice},
   };
 }
 
@@ -209,6 +224,15 @@ Json to_json(const TextureSection& texture) {
       {"psnr_db", to_json(texture.psnr_db, 2)},
       {"ssim", to_json(texture.ssim, kRatioDigits)},
       {"lowered", texture.lowered},
+  };
+}
+
+Json to_json(const FinishSection& finish) {
+  return {
+      {"ready", finish.ready},
+      {"sentence", finish.sentence},
+      {"gap_ratio", rounded(finish.gap_ratio, kPixelDigits)},
+      {"gaps", list(finish.gaps)},
   };
 }
 
@@ -264,6 +288,7 @@ std::string render_report_json(const ReconstructionReport& report) {
   add_section(document, "dense", report.dense);
   add_section(document, "surface", report.surface);
   add_section(document, "texture", report.texture);
+  add_section(document, "finish", report.finish);
   return document.dump(kIndent, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

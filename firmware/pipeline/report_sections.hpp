@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 
+#include "sfm/coverage/gap_kind.hpp"
 #include "sfm/keyframes/frame_verdict.hpp"
 
 namespace trigmesh {
@@ -59,6 +60,25 @@ struct SurfaceSection {
   std::size_t holes_open = 0;             ///< outer borders of an open surface count as one
   std::vector<OpenHole> largest_holes{};  ///< the largest first; as many as are worth telling
   std::vector<std::string> lowered{};
+};
+
+/// A place where the surface is open or weak, and from where to shoot it.
+struct FinishGap {
+  GapKind kind = GapKind::kHole;
+  Eigen::Vector3d center_in_world = Eigen::Vector3d::Zero();
+  double area_ratio = 0.0;     ///< of the subject's area
+  std::string photograph;      ///< taken from most nearly the right place
+  double turn_left_deg = 0.0;  ///< from there around the gap; to the right < 0
+  double rise_deg = 0.0;  ///< above the horizon of the gap, more than that photograph; < 0 lower
+  std::string advice;     ///< all of it in a sentence
+};
+
+/// Whether the thing is shot, or what is missing.
+struct FinishSection {
+  bool ready = false;
+  std::string sentence;
+  double gap_ratio = 0.0;  ///< area of all gaps that photographs would close, of the subject's
+  std::vector<FinishGap> gaps{};  ///< the largest first; as many as are worth telling
 };
 
 /// The pictures on the mesh.

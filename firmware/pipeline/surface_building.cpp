@@ -14,9 +14,11 @@
 #include "firmware/base/check.hpp"
 #include "firmware/base/file_bytes.hpp"
 #include "firmware/pipeline/dense_stage.hpp"
+#include "firmware/pipeline/finish.hpp"
 #include "firmware/pipeline/model_writer.hpp"
 #include "firmware/pipeline/photo_images.hpp"
 #include "firmware/pipeline/surface_plan.hpp"
+#include "sfm/coverage/surface_coverage.hpp"
 #include "sfm/dense/undistortion.hpp"
 #include "sfm/exchange/glb.hpp"
 #include "sfm/exchange/obj.hpp"
@@ -172,6 +174,10 @@ SurfaceSection sum_up(const SurfaceResult& made) {
 
 Result<TriangleMesh> add_mesh(Work& work, SurfaceResult made) {
   work.report.surface = sum_up(made);
+  work.report.finish =
+      judge_finish(measure_surface_coverage(made.mesh, work.views, work.context.executor),
+                   work.views,
+                   work.report.verdict);
   warn(work.report, work.report.surface->lowered);
   work.stopwatch.finish(Stage::kSurface);
   std::vector<NamedFile> files(1);

@@ -141,10 +141,11 @@ std::optional<FrameUse> frame_use_from_string(std::string_view name) {
 
 Result<bool> wants_keyframes(const PhotoSet& photos, FrameUse use) {
   if (use == FrameUse::kKeyframes && photos.timestamps.empty()) {
-    return fail(ErrorCode::kInvalidArgument,
-                "keyframes can only be chosen from a recording whose timestamps.csv says when each "
-                "frame was taken; {} has no times",
-                photos.description);
+    return fail(
+        ErrorCode::kInvalidArgument,
+        "keyframes can only be chosen from a video or a recording whose timestamps.csv says "
+        "when each frame was taken; {} has no times",
+        photos.description);
   }
   return use == FrameUse::kKeyframes || (use == FrameUse::kAuto && is_video(photos));
 }

@@ -141,6 +141,21 @@ TEST_F(ReportPage, DrawsAModel) {
   EXPECT_THAT(visit.dom, HasSubstr("10 of 11 images are registered, 1 is refused."));
 }
 
+TEST_F(ReportPage, SaysWhatIsMissing) {
+  ReportInput input;
+  const std::vector<ImageOutcome> images{outcome_named("a.jpg")};
+  input.images = images;
+  input.finish =
+      FinishSection{false,
+                    "Not ready: 5 % is open.",
+                    0.05,
+                    {{GapKind::kHole, {0, 0, 0}, 0.05, "a.jpg", 40, 0, "<i>go left</i>"}}};
+  const Visit visit = open(render_report_html(build_report(input), {}), "");
+  expect_sound(visit);
+  EXPECT_THAT(visit.dom, HasSubstr("Not ready: 5 % is open."));
+  EXPECT_THAT(visit.dom, HasSubstr("&lt;i&gt;go left&lt;/i&gt;"));
+}
+
 TEST_F(ReportPage, DrawsTheFramesOfAVideo) {
   ReportInput input;
   const std::vector<VideoFrameSection> frames{

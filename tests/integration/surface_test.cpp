@@ -17,6 +17,7 @@ namespace trigmesh::test_support {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::AnyOf;
 using ::testing::HasSubstr;
 
 constexpr std::chrono::seconds kTimeLimit{200};
@@ -84,6 +85,8 @@ TEST_F(Surface, ReconstructEndsWithATexturedMesh) {
   EXPECT_EQ(contents(path("out/model/textured.glb")).substr(0, 4), "glTF");
   EXPECT_THAT(contents(path("out/model/textured.obj")), HasSubstr("mtllib textured.mtl"));
   EXPECT_FALSE(fs::exists(path("out/work")));
+  EXPECT_THAT(contents(path("out/model/report.json")), HasSubstr("\"gap_ratio\""));
+  EXPECT_THAT(result.out, AnyOf(HasSubstr("\nReady"), HasSubstr("\nNot ready")));
 
   const auto one_thread = all_files(path("out/model"));
   ASSERT_EQ(run_trigmesh(reconstruct({"--threads", "2"}), kTimeLimit).exit_code, 0);

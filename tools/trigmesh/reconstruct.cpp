@@ -7,6 +7,7 @@
 
 #include "firmware/base/check.hpp"
 #include "firmware/photos/photo_input.hpp"
+#include "firmware/photos/video_input.hpp"
 #include "firmware/pipeline/reconstruction.hpp"
 #include "sfm/exchange/camera_profile.hpp"
 #include "sfm/exchange/model_folder.hpp"
@@ -22,13 +23,14 @@ constexpr const char* kFooter = R"(Examples:
   trigmesh reconstruct photos --output model
   trigmesh reconstruct photos --output model --camera rig.toml
   trigmesh reconstruct recording --output model --match sequential --threads 2
-  trigmesh reconstruct video --output model --frames keyframes
+  trigmesh reconstruct clip.mp4 --output model
   trigmesh reconstruct photos --output model --preset preview
   trigmesh reconstruct list.txt --output model --stop-after sparse --memory-limit 500M
 
-INPUT is a folder of JPEG or PNG photographs, a text file with one path a line, or a recording (a folder with
-images/ and, if there is one, timestamps.csv). Of a recording with 10 frames a second or more only keyframes are used:
-the sharpest frame of each stretch with enough motion; the report says of each frame why. The result is OUTPUT/model:
+INPUT is a folder of JPEG or PNG photographs, a text file with one path a line, a recording (a folder with images/ and,
+if there is one, timestamps.csv), or a video file, whose frames the program ffmpeg (Debian package ffmpeg) writes to
+OUTPUT/frames. Of a video or recording with 10 frames a second or more only keyframes are used: the sharpest frame of
+each stretch with enough motion; the report says of each frame why. The result is OUTPUT/model:
 sparse/ (COLMAP text), projections.txt, sparse.ply, dense.ply, mesh.ply, textured.glb, textured.obj, report.json and
 report.html. When interrupted, the same command goes on where it stopped.
 )";
@@ -80,15 +82,26 @@ Result<ReconstructionOptions> options_from(const ReconstructArguments& arguments
   return options;
 }
 
+Result<PhotoSet> open_input(const ReconstructArguments& arguments,
+                            int num_threads,
+                            ProgressListener& listener,
+                            const std::stop_token& stop) {
+  const MaskUse masks = arguments.no_masks ? MaskUse::kIgnore : MaskUse::kUse;
+  if (is_video_input(arguments.input)) {
+    return open_video(arguments.input, arguments.output, masks, num_threads, listener, stop);
+  }
+  return open_photos(arguments.input,
+                     arguments.grouping == "folder" ? Subfolders::kInclude : Subfolders::kIgnore,
+                     masks);
+}
+
 Result<> run(const ReconstructArguments& arguments) {
   TM_ASSIGN_OR_RETURN(const ReconstructionOptions options, options_from(arguments));
-  TM_ASSIGN_OR_RETURN(
-      const PhotoSet photos,
-      open_photos(arguments.input,
-                  arguments.grouping == "folder" ? Subfolders::kInclude : Subfolders::kIgnore,
-                  arguments.no_masks ? MaskUse::kIgnore : MaskUse::kUse));
+  const auto open = [&](ProgressListener& listener, const std::stop_token& stop) {
+    return open_input(arguments, options.num_threads, listener, stop);
+  };
   return run_reconstruction(
-      {photos, options, arguments.input, arguments.output, arguments.surface.quiet});
+      {open, options, arguments.input, arguments.output, arguments.surface.quiet});
 }
 
 }  // namespace
@@ -98,7 +111,9 @@ void add_reconstruct_command(CLI::App& app, CommandContext& context) {
       "reconstruct",
       "Make camera poses, a coloured point cloud and a textured mesh from photographs");
   auto arguments = std::make_shared<ReconstructArguments>();
-  command->add_option("INPUT", arguments->input, "Folder of photographs, list file or recording")
+  command
+      ->add_option(
+          "INPUT", arguments->input, "Folder of photographs, list file, recording or video file")
       ->required();
   command->add_option("-o,--output", arguments->output, "Folder for the result; made when missing")
       ->required();
@@ -128,11 +143,12 @@ void add_reconstruct_command(CLI::App& app, CommandContext& context) {
                     "Do not look for features at twice the image size (SIFT, SURF): twice as fast, "
                     "poses somewhat less exact");
   command
-      ->add_option("--frames",
-                   arguments->frames,
-                   "Which frames of a recording are used; auto: the keyframes of a video; walk: "
-                   "all, which are "
-                   "the keyframes of a walk in their order")
+      ->add_option(
+          "--frames",
+          arguments->frames,
+          "Which frames of a video or recording are used; auto: the keyframes of a video; walk: "
+          "all, which are "
+          "the keyframes of a walk in their order")
       ->check(CLI::IsMember({"auto", "all", "keyframes", "walk"}))
       ->capture_default_str();
   command->add_option("--match", arguments->match, "Which photographs are compared")

@@ -22,6 +22,12 @@ void print_summary(const ReconstructionReport& report, const std::string& output
   for (const ReportNote& note : report.notes) {
     fmt::print("  {}: {}\n", to_string(note.severity), note.text);
   }
+  if (report.finish) {
+    fmt::print("{}\n", report.finish->sentence);
+    for (const FinishGap& gap : report.finish->gaps) {
+      fmt::print("  {}\n", gap.advice);
+    }
+  }
   fmt::print(
       "{} points, mean reprojection error {:.2f} px\nresult in {}/model, open "
       "{}/model/report.html\n",
@@ -40,9 +46,9 @@ Result<> run_reconstruction(const ReconstructRun& run) {
   {
     ProgressPrinter printer(
         run.quiet ? ProgressPrinter::Style::kQuiet : ProgressPrinter::style_of_stderr(), clock);
+    TM_ASSIGN_OR_RETURN(const PhotoSet photos, run.open(printer, interrupt.token()));
     TM_ASSIGN_OR_RETURN(
-        summary,
-        reconstruct(run.photos, run.output, run.options, clock, printer, interrupt.token()));
+        summary, reconstruct(photos, run.output, run.options, clock, printer, interrupt.token()));
   }
   print_summary(summary->report, run.output);
   if (summary->report.components.empty()) {

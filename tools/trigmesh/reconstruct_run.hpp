@@ -1,5 +1,7 @@
 #pragma once
 
+#include <functional>
+#include <stop_token>
 #include <string>
 
 #include "firmware/base/result.hpp"
@@ -10,7 +12,8 @@ namespace trigmesh {
 
 /// A reconstruction from the command line.
 struct ReconstructRun {
-  const PhotoSet& photos;
+  /// Opens the input, with progress where that takes long.
+  std::function<Result<PhotoSet>(ProgressListener&, const std::stop_token&)> open;
   const ReconstructionOptions& options;
   const std::string& input;   ///< as the user called it
   const std::string& output;  ///< folder
@@ -18,7 +21,7 @@ struct ReconstructRun {
 };
 
 /// Makes it with progress on stderr, Ctrl-C ends it in order, and prints what it came to. Errors:
-/// those of reconstruct(); kInsufficientData also when there is no model.
+/// those of opening and of reconstruct(); kInsufficientData also when there is no model.
 [[nodiscard]] Result<> run_reconstruction(const ReconstructRun& run);
 
 }  // namespace trigmesh

@@ -158,8 +158,11 @@ Result<> verify(const ReplayArguments& arguments) {
 
 Result<> run(const ReplayArguments& arguments) {
   TM_ASSIGN_OR_RETURN(const auto input, open_input(arguments));
+  const auto open = [&](ProgressListener&, const std::stop_token&) -> Result<PhotoSet> {
+    return input->photos;
+  };
   TM_RETURN_IF_ERROR(run_reconstruction(
-      {input->photos, input->options, arguments.session, arguments.output, arguments.quiet}));
+      {open, input->options, arguments.session, arguments.output, arguments.quiet}));
   return arguments.verify ? verify(arguments) : Result<>();
 }
 

@@ -17,9 +17,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view kWhatIsAccepted =
-    "give a folder of *.jpg, *.jpeg or *.png files, a text file that lists them one a line, or a "
-    "recording (a folder "
-    "with images/ or frames/)";
+    "give a folder of *.jpg, *.jpeg or *.png files, a text file that lists them one a line, a "
+    "recording (a folder with images/ or frames/), or, to trigmesh reconstruct, a video file";
 
 /// By the extension, upper or lower case; nothing for files that are not pictures.
 std::optional<PixelFormat> format_of(const fs::path& path) {

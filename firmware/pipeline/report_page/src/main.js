@@ -2,6 +2,7 @@
 
 import { readData } from './data.js';
 import { createTooltip, h, section } from './dom.js';
+import { buildFinish } from './finish.js';
 import { buildHistogram } from './histogram.js';
 import { buildImageTable } from './image_table.js';
 import { buildMatchMatrix } from './match_matrix.js';
@@ -59,6 +60,7 @@ function build() {
       buildHeader(report),
       buildNotes(report.notes),
       buildCards(report),
+      buildFinish(report, select),
       viewer?.element,
       buildSurface(report),
       buildDepthMaps(report, depthMaps, select),

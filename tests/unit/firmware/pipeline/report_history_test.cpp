@@ -35,6 +35,8 @@ ReconstructionReport some_report() {
   report.cameras[0].group = 1;
   report.cameras[0].origin = IntrinsicsOrigin::kPriorRefined;
   report.settings = {{"seed", "7"}};
+  report.finish = FinishSection{
+      true, "Ready.", 0.01, {{GapKind::kHole, {1, -2, 3}, 0.01, "b.jpg", 40, -10, "go left"}}};
   return report;
 }
 
@@ -61,6 +63,31 @@ TEST(ReportHistory, IsWhatTheReportWasMadeFrom) {
             (std::vector{IntrinsicsOrigin::kSolved, IntrinsicsOrigin::kPriorRefined}));
   ASSERT_EQ(history->settings.size(), 1U);
   EXPECT_EQ(history->settings[0].value, "7");
+}
+
+TEST(ReportHistory, KnowsWhatWasMissing) {
+  const auto history = parse_report_history(render_report_json(some_report()));
+  ASSERT_TRUE(history) << history.error().message;
+  ASSERT_TRUE(history->finish.has_value());
+  EXPECT_TRUE(history->finish->ready);
+  EXPECT_EQ(history->finish->sentence, "Ready.");
+  EXPECT_EQ(history->finish->gap_ratio, 0.01);
+  ASSERT_EQ(history->finish->gaps.size(), 1U);
+  const FinishGap& gap = history->finish->gaps[0];
+  EXPECT_EQ(gap.kind, GapKind::kHole);
+  EXPECT_EQ(gap.center_in_world, Eigen::Vector3d(1, -2, 3));
+  EXPECT_EQ(gap.photograph, "b.jpg");
+  EXPECT_EQ(gap.turn_left_deg, 40.0);
+  EXPECT_EQ(gap.rise_deg, -10.0);
+  EXPECT_EQ(gap.advice, "go left");
+}
+
+TEST(ReportHistory, MayHaveNoFinish) {
+  Json document = Json::parse(render_report_json(some_report()));
+  document.erase("finish");
+  const auto history = parse_report_history(document.dump());
+  ASSERT_TRUE(history) << history.error().message;
+  EXPECT_FALSE(history->finish.has_value());
 }
 
 TEST(ReportHistory, MayHaveNoFrames) {
@@ -111,6 +138,15 @@ INSTANTIATE_TEST_SUITE_P(
         Damage{"HugeGroup",
                [](Json& json) { json["cameras"][0]["group"] = 4'000'000'000U; },
                "\"group\""},
+        Damage{"FinishIsText", [](Json& json) { json["finish"] = "done"; }, "\"ready\""},
+        Damage{"GapInThePlane",
+               [](Json& json) {
+                 json["finish"]["gaps"][0]["center"] = {1, 2};
+               },
+               "\"center\" is no point"},
+        Damage{"GapOfAnotherKind",
+               [](Json& json) { json["finish"]["gaps"][0]["kind"] = "tear"; },
+               "\"kind\""},
         Damage{"UnknownOrigin",
                [](Json& json) { json["cameras"][0]["origin"] = "guessed"; },
                "\"origin\""}),

@@ -94,7 +94,7 @@ TEST(ReportJson, IsTheSameForTheSameReport) {
 
 TEST(ReportJson, HasNoMemberForStagesThatDidNotRun) {
   const Json json = Json::parse(render_report_json(small_report()));
-  for (const char* section : {"dense", "surface", "texture"}) {
+  for (const char* section : {"dense", "surface", "texture", "finish"}) {
     EXPECT_FALSE(json.contains(section)) << section;
   }
   EXPECT_TRUE(json["metres_per_unit"].is_null());
@@ -134,6 +134,23 @@ TEST(ReportJson, TellsOfDenseSurfaceAndTexture) {
   EXPECT_EQ(json["surface"]["largest_holes"][0]["perimeter"], 0.00123457);
   EXPECT_EQ(json["texture"]["psnr_db"], 24.57);
   EXPECT_TRUE(json["texture"]["ssim"].is_null());
+}
+
+TEST(ReportJson, TellsWhatIsMissing) {
+  ReconstructionReport report = small_report();
+  report.finish = FinishSection{false,
+                                "Not ready.",
+                                0.0456789,
+                                {{GapKind::kWeak, {1, 2, 3}, 0.03, "a.jpg", -40.04, 12, "go"}}};
+  const Json finish = Json::parse(render_report_json(report))["finish"];
+  EXPECT_EQ(finish["ready"], false);
+  EXPECT_EQ(finish["sentence"], "Not ready.");
+  EXPECT_EQ(finish["gap_ratio"], 0.0457);
+  EXPECT_EQ(finish["gaps"][0]["kind"], "weak");
+  EXPECT_EQ(finish["gaps"][0]["center"][1], 2.0);
+  EXPECT_EQ(finish["gaps"][0]["photograph"], "a.jpg");
+  EXPECT_EQ(finish["gaps"][0]["turn_left_deg"], -40.0);
+  EXPECT_EQ(finish["gaps"][0]["advice"], "go");
 }
 
 TEST(ReportJson, HoldsEmptyListsForAnEmptyReport) {
