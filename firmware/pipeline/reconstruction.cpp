@@ -185,6 +185,8 @@ std::string_view to_string(Stage stage) {
       return "mapping";
     case Stage::kDepth:
       return "depth";
+    case Stage::kMoving:
+      return "moving";
     case Stage::kFuse:
       return "fusion";
     case Stage::kSurface:
