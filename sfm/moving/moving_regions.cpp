@@ -14,11 +14,18 @@ namespace trigmesh {
 
 namespace {
 
-// A keypoint speaks of the disc of this many of its scales.
+// A keypoint speaks of the disc of this many of its scales; of a large one the middle is enough.
 constexpr double kDiscScales = 1.5;
+constexpr double kSmallestDiscPx = 2.0;
+constexpr double kLargestDiscPx = 6.0;
+// Views in which a keypoint must be where the poses expect it before it counts as standing still:
+// one in some twenty wrong matches is so by chance.
+constexpr std::size_t kMinAgreeingViews = 2;
 // Lines of hidden background are edges that a pose or map misses by a pixel: what a square of this
 // side does not fit into is dropped.
 constexpr int kThinPx = 3;
+// Side of the square by which pieces are widened to see which belong together.
+constexpr int kJoiningPx = 9;
 // Pixels at the border of a thing show some of both.
 constexpr int kMarginPx = 1;
 
@@ -32,8 +39,9 @@ struct Evidence {
 void draw_disc(const Keypoint& keypoint, cv::Mat& picture) {
   const cv::Point center(static_cast<int>(std::lround(keypoint.x_px)),
                          static_cast<int>(std::lround(keypoint.y_px)));
-  const int radius = std::max(
-      1, static_cast<int>(std::lround(kDiscScales * static_cast<double>(keypoint.scale_px))));
+  const double radius_px = std::clamp(
+      kDiscScales * static_cast<double>(keypoint.scale_px), kSmallestDiscPx, kLargestDiscPx);
+  const int radius = static_cast<int>(std::lround(radius_px));
   cv::circle(picture, center, radius, cv::Scalar(255), cv::FILLED);
 }
 
@@ -47,7 +55,7 @@ Evidence gather(const MovingView& view,
   const cv::Mat square(kThinPx, kThinPx, CV_8UC1, cv::Scalar(1));
   cv::morphologyEx(hidden, evidence.hidden, cv::MORPH_OPEN, square);
   for (const FeatureEvidence& feature : features) {
-    if (feature.agreeing > feature.contradicting) {
+    if (feature.agreeing >= kMinAgreeingViews && feature.agreeing > feature.contradicting) {
       draw_disc(feature.keypoint, evidence.marks.settled);
     } else if (feature.contradicting >= options.min_contradicting_views &&
                feature.contradicting > 2 * feature.agreeing) {
@@ -63,25 +71,27 @@ Evidence gather(const MovingView& view,
   return evidence;
 }
 
-/// The pieces of a region that have enough evidence.
-cv::Mat accepted_pieces(const cv::Mat& region,
-                        const Evidence& evidence,
-                        const RegionOptions& options) {
-  cv::Mat labels;
-  cv::Mat stats;
-  cv::Mat centers;
-  const int count = cv::connectedComponentsWithStats(region, labels, stats, centers, 8, CV_32S);
+/// How much evidence a piece of a region has.
+struct PieceTally {
+  std::size_t keypoints = 0;
+  double area = 0.0;
+  double hidden = 0.0;
+  double marked = 0.0;
+};
 
-  struct Tally {
-    std::size_t keypoints = 0;
-    double hidden = 0.0;
-    double marked = 0.0;
-  };
-
-  std::vector<Tally> tallies(static_cast<std::size_t>(count));
+/// Per label: what of the region and of the evidence lies in it.
+std::vector<PieceTally> tally_pieces(const cv::Mat& region,
+                                     const cv::Mat& labels,
+                                     int count,
+                                     const Evidence& evidence) {
+  std::vector<PieceTally> tallies(static_cast<std::size_t>(count));
   for (int y = 0; y < region.rows; ++y) {
     for (int x = 0; x < region.cols; ++x) {
-      Tally& tally = tallies[static_cast<std::size_t>(labels.at<std::int32_t>(y, x))];
+      if (region.at<std::uint8_t>(y, x) == 0) {
+        continue;
+      }
+      PieceTally& tally = tallies[static_cast<std::size_t>(labels.at<std::int32_t>(y, x))];
+      tally.area += 1.0;
       tally.hidden += evidence.hidden.at<std::uint8_t>(y, x) != 0 ? 1.0 : 0.0;
       tally.marked += evidence.marks.moving.at<std::uint8_t>(y, x) != 0 ? 1.0 : 0.0;
     }
@@ -91,16 +101,28 @@ cv::Mat accepted_pieces(const cv::Mat& region,
                            std::clamp(at.y, 0, region.rows - 1));
     ++tallies[static_cast<std::size_t>(labels.at<std::int32_t>(inside))].keypoints;
   }
+  return tallies;
+}
+
+/// The pieces of a region that have enough evidence. What stands in front (bars, twigs) cuts one
+/// thing into pieces: those that lie close together are judged together.
+cv::Mat accepted_pieces(const cv::Mat& region,
+                        const Evidence& evidence,
+                        const RegionOptions& options) {
+  cv::Mat joined;
+  cv::dilate(region, joined, cv::Mat(kJoiningPx, kJoiningPx, CV_8UC1, cv::Scalar(1)));
+  cv::Mat labels;
+  const int count = cv::connectedComponents(joined, labels, 8, CV_32S);
+  const std::vector<PieceTally> tallies = tally_pieces(region, labels, count, evidence);
   cv::Mat accepted(region.size(), CV_8UC1, cv::Scalar(0));
   const auto pixels = static_cast<double>(region.total());
   for (int label = 1; label < count; ++label) {
-    const Tally& tally = tallies[static_cast<std::size_t>(label)];
-    const double area = stats.at<std::int32_t>(label, cv::CC_STAT_AREA);
+    const PieceTally& tally = tallies[static_cast<std::size_t>(label)];
     const bool evident = tally.keypoints >= options.min_keypoints ||
                          tally.hidden >= options.min_hidden_ratio * pixels;
-    if (evident && area >= options.min_area_ratio * pixels &&
-        tally.marked >= options.min_evidence_ratio * area) {
-      accepted.setTo(255, labels == label);
+    if (evident && tally.area >= options.min_area_ratio * pixels &&
+        tally.marked >= options.min_evidence_ratio * tally.area) {
+      accepted.setTo(255, (labels == label) & region);
     }
   }
   return accepted;

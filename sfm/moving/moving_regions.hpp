@@ -17,15 +17,15 @@ namespace trigmesh {
 /// How regions are drawn around the evidence.
 struct RegionOptions {
   /// Views that must contradict a keypoint before it counts, >= 1.
-  std::size_t min_contradicting_views = 2;
+  std::size_t min_contradicting_views = 1;
   /// Smallest region, part of the picture, (0, 1).
   double min_area_ratio = 0.002;
   /// Such keypoints that a region must hold, >= 1, unless `min_hidden_ratio` of the picture in it
   /// hides the background, (0, 1).
-  std::size_t min_keypoints = 6;
+  std::size_t min_keypoints = 12;
   double min_hidden_ratio = 0.002;
   /// Part of a region that must be evidence of one kind or the other, [0, 1].
-  double min_evidence_ratio = 0.1;
+  double min_evidence_ratio = 0.04;
 
   /// Names the field, its value and the violated rule.
   [[nodiscard]] Result<> validate() const;

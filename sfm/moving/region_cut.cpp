@@ -18,7 +18,7 @@ namespace {
 
 // Costs, in tenths of a nat of colour preference.
 constexpr std::int32_t kMarkCost = 60;
-constexpr float kColorCost = 10.0F;
+constexpr float kColorCost = 20.0F;
 constexpr std::int32_t kPriorCost = 3;
 constexpr float kBorderCost = 4.0F;
 constexpr float kContrastCost = 40.0F;
