@@ -24,16 +24,8 @@ namespace trigmesh {
 namespace {
 
 constexpr int kSmallestSidePx = 16;
-// Of the common motion, in pictures of a few hundred pixels.
-constexpr double kMotionErrorPx = 1.5;
-
-/// The keypoints of a view, ready to be compared.
-struct ViewFeatures {
-  FeatureSet set;
-  std::optional<DescriptorIndex> index;
-  std::vector<Eigen::Vector2d> points_px;
-  std::vector<std::uint8_t> open;  ///< per keypoint: 1 = no surface is confirmed there
-};
+// Largest error of the common motion, of the distance that makes a contradiction.
+constexpr double kMotionErrorRatio = 0.375;
 
 bool is_open(const MovingView& view, const Keypoint& keypoint) {
   const int x =
@@ -45,45 +37,36 @@ bool is_open(const MovingView& view, const Keypoint& keypoint) {
   return !left_out && !confirmed;
 }
 
-Result<ViewFeatures> extract_features(const MovingView& view, const FeatureExtractor& extractor) {
-  ViewFeatures features;
+Result<ComparableView> comparable_view(const MovingView& view, const FeatureExtractor& extractor) {
+  ComparableView comparable;
+  comparable.camera = view.camera;
+  comparable.cam_from_world = view.cam_from_world;
+  comparable.neighbors = view.neighbors;
   if (std::min(view.camera.width_px, view.camera.height_px) >= kSmallestSidePx) {
     cv::Mat grey;
     cv::cvtColor(view.rgb, grey, cv::COLOR_RGB2GRAY);
-    TM_ASSIGN_OR_RETURN(features.set, extractor.extract(grey));
+    TM_ASSIGN_OR_RETURN(comparable.features, extractor.extract(grey));
   }
-  for (const Keypoint& keypoint : features.set.keypoints) {
-    features.points_px.emplace_back(keypoint.x_px, keypoint.y_px);
-    features.open.push_back(is_open(view, keypoint) ? 1 : 0);
+  for (const Keypoint& keypoint : comparable.features.keypoints) {
+    comparable.points_px.emplace_back(keypoint.x_px, keypoint.y_px);
+    comparable.open.push_back(is_open(view, keypoint) ? 1 : 0);
   }
-  return features;
+  return comparable;
 }
 
-Result<std::vector<ViewFeatures>> extract_all(std::span<const MovingView> views,
-                                              const ContradictionOptions& options,
-                                              Executor& executor) {
-  FeatureOptions feature_options;
-  feature_options.max_keypoints = options.max_keypoints;
-  TM_ASSIGN_OR_RETURN(const std::unique_ptr<FeatureExtractor> extractor,
-                      create_feature_extractor(FeatureKind::kSift, feature_options));
-  std::vector<Result<ViewFeatures>> made(views.size());
-  executor.for_each_index(views.size(),
-                          [&](std::size_t i) { made[i] = extract_features(views[i], *extractor); });
-  std::vector<ViewFeatures> features;
-  for (Result<ViewFeatures>& one : made) {
-    TM_RETURN_IF_ERROR(one);
-    features.push_back(std::move(*one));
+/// Forgets all but the first (coarsest) keypoints.
+void shorten(ComparableView& view, std::size_t count) {
+  if (view.features.size() > count) {
+    view.features.keypoints.resize(count);
+    view.features.descriptors.resize(count * view.features.descriptor_bytes);
+    view.points_px.resize(count);
+    view.open.resize(count);
   }
-  // The index borrows descriptors that stay where they are from here on.
-  for (ViewFeatures& one : features) {
-    TM_ASSIGN_OR_RETURN(one.index, DescriptorIndex::build(one.set));
-  }
-  return features;
 }
 
 /// Ascending pairs (first < second) in which every view meets its neighbours and others spread
 /// evenly over the input.
-std::vector<std::pair<std::size_t, std::size_t>> pairs_of(std::span<const MovingView> views,
+std::vector<std::pair<std::size_t, std::size_t>> pairs_of(std::span<const ComparableView> views,
                                                           std::size_t max_partners) {
   std::vector<std::pair<std::size_t, std::size_t>> pairs;
   const std::size_t count = views.size();
@@ -107,7 +90,7 @@ std::vector<std::pair<std::size_t, std::size_t>> pairs_of(std::span<const Moving
   return pairs;
 }
 
-Eigen::Matrix3d fundamental_of(const MovingView& first, const MovingView& second) {
+Eigen::Matrix3d fundamental_of(const ComparableView& first, const ComparableView& second) {
   const Rigid3 motion = second.cam_from_world * first.cam_from_world.inverse();
   return fundamental_from_essential(essential_from_pose(motion),
                                     first.camera.calibration_matrix(),
@@ -120,45 +103,58 @@ struct PairOpinion {
   std::vector<FeatureMatch> contradicting;
 };
 
-VerificationImage verification_image(const MovingView& view, const ViewFeatures& features) {
-  return {.points_px = features.points_px,
+VerificationImage verification_image(const ComparableView& view) {
+  return {.points_px = view.points_px,
           .width_px = view.camera.width_px,
           .height_px = view.camera.height_px,
           .calibration = view.camera.calibration_matrix()};
 }
 
-PairOpinion judge_pair(std::span<const MovingView> views,
-                       std::span<const ViewFeatures> features,
-                       std::pair<std::size_t, std::size_t> pair,
+PairOpinion judge_pair(const ComparableView& first,
+                       const ComparableView& second,
+                       std::span<const FeatureMatch> matches,
                        const ContradictionOptions& options) {
-  const auto [a, b] = pair;
-  const Eigen::Matrix3d fundamental = fundamental_of(views[a], views[b]);
+  const Eigen::Matrix3d fundamental = fundamental_of(first, second);
   PairOpinion opinion;
   std::vector<FeatureMatch> suspects;
-  for (const FeatureMatch& match :
-       match_descriptors(*features[a].index, *features[b].index, MatchOptions{})) {
+  for (const FeatureMatch& match : matches) {
     const std::size_t i = index(match.first);
     const std::size_t j = index(match.second);
-    const double error_px = std::sqrt(
-        sampson_error_squared(fundamental, features[a].points_px[i], features[b].points_px[j]));
+    const double error_px =
+        std::sqrt(sampson_error_squared(fundamental, first.points_px[i], second.points_px[j]));
     if (error_px <= options.max_agreement_px) {
       opinion.agreeing.push_back(match);
-    } else if (error_px > options.min_contradiction_px && features[a].open[i] != 0 &&
-               features[b].open[j] != 0) {
+    } else if (error_px > options.min_contradiction_px && first.open[i] != 0 &&
+               second.open[j] != 0) {
       suspects.push_back(match);
     }
   }
   if (suspects.size() >= options.min_common_motion) {
     VerificationOptions verification;
-    verification.max_error_px = kMotionErrorPx;
+    verification.max_error_px = kMotionErrorRatio * options.min_contradiction_px;
     verification.min_inliers = options.min_common_motion;
-    opinion.contradicting = verify_pair(suspects,
-                                        verification_image(views[a], features[a]),
-                                        verification_image(views[b], features[b]),
-                                        verification)
-                                .inliers;
+    opinion.contradicting =
+        verify_pair(suspects, verification_image(first), verification_image(second), verification)
+            .inliers;
   }
   return opinion;
+}
+
+/// Adds what every pair says to the evidence of its two views.
+void count_opinions(std::span<const std::pair<std::size_t, std::size_t>> pairs,
+                    std::span<const PairOpinion> opinions,
+                    std::vector<std::vector<FeatureEvidence>>& evidence) {
+  for (std::size_t p = 0; p < pairs.size(); ++p) {
+    const auto [a, b] = pairs[p];
+    for (const FeatureMatch& match : opinions[p].agreeing) {
+      ++evidence[a][index(match.first)].agreeing;
+      ++evidence[b][index(match.second)].agreeing;
+    }
+    for (const FeatureMatch& match : opinions[p].contradicting) {
+      ++evidence[a][index(match.first)].contradicting;
+      ++evidence[b][index(match.second)].contradicting;
+    }
+  }
 }
 
 }  // namespace
@@ -183,34 +179,51 @@ Result<> ContradictionOptions::validate() const {
   return {};
 }
 
-Result<std::vector<std::vector<FeatureEvidence>>> find_contradicting_features(
-    std::span<const MovingView> views, const ContradictionOptions& options, Executor& executor) {
+bool has_moved(const FeatureEvidence& evidence) {
+  return evidence.contradicting > 2 * evidence.agreeing;
+}
+
+Result<std::vector<std::vector<FeatureEvidence>>> compare_views(std::vector<ComparableView> views,
+                                                                const ContradictionOptions& options,
+                                                                Executor& executor) {
   TM_RETURN_IF_ERROR(options.validate());
-  TM_ASSIGN_OR_RETURN(const std::vector<ViewFeatures> features,
-                      extract_all(views, options, executor));
+  std::vector<DescriptorIndex> indexes;  // borrow from the views, which stay where they are
   std::vector<std::vector<FeatureEvidence>> evidence(views.size());
   for (std::size_t i = 0; i < views.size(); ++i) {
-    for (const Keypoint& keypoint : features[i].set.keypoints) {
+    shorten(views[i], static_cast<std::size_t>(options.max_keypoints));
+    TM_ASSIGN_OR_RETURN(DescriptorIndex index_of_view, DescriptorIndex::build(views[i].features));
+    indexes.push_back(std::move(index_of_view));
+    for (const Keypoint& keypoint : views[i].features.keypoints) {
       evidence[i].push_back({keypoint});
     }
   }
   const auto pairs = pairs_of(views, options.max_partners);
   std::vector<PairOpinion> opinions(pairs.size());
   executor.for_each_index(pairs.size(), [&](std::size_t p) {
-    opinions[p] = judge_pair(views, features, pairs[p], options);
+    const auto& [a, b] = pairs[p];
+    opinions[p] = judge_pair(
+        views[a], views[b], match_descriptors(indexes[a], indexes[b], MatchOptions{}), options);
   });
-  for (std::size_t p = 0; p < pairs.size(); ++p) {
-    const auto [a, b] = pairs[p];
-    for (const FeatureMatch& match : opinions[p].agreeing) {
-      ++evidence[a][index(match.first)].agreeing;
-      ++evidence[b][index(match.second)].agreeing;
-    }
-    for (const FeatureMatch& match : opinions[p].contradicting) {
-      ++evidence[a][index(match.first)].contradicting;
-      ++evidence[b][index(match.second)].contradicting;
-    }
-  }
+  count_opinions(pairs, opinions, evidence);
   return evidence;
+}
+
+Result<std::vector<std::vector<FeatureEvidence>>> find_contradicting_features(
+    std::span<const MovingView> views, const ContradictionOptions& options, Executor& executor) {
+  TM_RETURN_IF_ERROR(options.validate());
+  FeatureOptions feature_options;
+  feature_options.max_keypoints = options.max_keypoints;
+  TM_ASSIGN_OR_RETURN(const std::unique_ptr<FeatureExtractor> extractor,
+                      create_feature_extractor(FeatureKind::kSift, feature_options));
+  std::vector<Result<ComparableView>> made(views.size());
+  executor.for_each_index(views.size(),
+                          [&](std::size_t i) { made[i] = comparable_view(views[i], *extractor); });
+  std::vector<ComparableView> comparable;
+  for (Result<ComparableView>& one : made) {
+    TM_RETURN_IF_ERROR(one);
+    comparable.push_back(std::move(*one));
+  }
+  return compare_views(std::move(comparable), options, executor);
 }
 
 }  // namespace trigmesh

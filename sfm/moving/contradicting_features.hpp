@@ -1,12 +1,17 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "firmware/base/executor.hpp"
 #include "firmware/base/result.hpp"
+#include "sfm/camera/camera.hpp"
 #include "sfm/features/features.hpp"
+#include "sfm/geometry/rigid3.hpp"
 #include "sfm/moving/moving_view.hpp"
 
 namespace trigmesh {
@@ -36,6 +41,25 @@ struct FeatureEvidence {
   std::size_t agreeing = 0;       ///< its match there is where the poses expect it
   std::size_t contradicting = 0;  ///< it matches another place there, as others around it do
 };
+
+/// Whether a keypoint counts as seen to move.
+[[nodiscard]] bool has_moved(const FeatureEvidence& evidence);
+
+/// The keypoints of one view with all that their comparison needs. Borrows nothing.
+struct ComparableView {
+  FeatureSet features;
+  std::vector<Eigen::Vector2d> points_px;  ///< undistorted; not-a-number where a pixel has no ray
+  std::vector<std::uint8_t> open;          ///< per keypoint: 0 = it cannot contradict
+  Camera camera;                           ///< kPinhole, of the undistorted pixels
+  Rigid3 cam_from_world;
+  std::vector<std::size_t> neighbors;  ///< positions of views that look at the same things
+};
+
+/// Evidence for the first `max_keypoints` (the coarsest) of each view. Lengths in the options are
+/// those of the cameras' pixels. Deterministic for any executor. kInvalidArgument: options,
+/// descriptors that do not fit.
+[[nodiscard]] Result<std::vector<std::vector<FeatureEvidence>>> compare_views(
+    std::vector<ComparableView> views, const ContradictionOptions& options, Executor& executor);
 
 /// SIFT keypoints of all views with the evidence from their matches. Keypoints on surfaces that
 /// other views confirm (`depth`) or that are left out (`mask`) cannot contradict. A view smaller

@@ -57,8 +57,7 @@ Evidence gather(const MovingView& view,
   for (const FeatureEvidence& feature : features) {
     if (feature.agreeing >= kMinAgreeingViews && feature.agreeing > feature.contradicting) {
       draw_disc(feature.keypoint, evidence.marks.settled);
-    } else if (feature.contradicting >= options.min_contradicting_views &&
-               feature.contradicting > 2 * feature.agreeing) {
+    } else if (feature.contradicting >= options.min_contradicting_views && has_moved(feature)) {
       draw_disc(feature.keypoint, evidence.marks.moving);
       evidence.keypoints.emplace_back(static_cast<int>(std::lround(feature.keypoint.x_px)),
                                       static_cast<int>(std::lround(feature.keypoint.y_px)));
