@@ -94,7 +94,7 @@ TEST(ReportJson, IsTheSameForTheSameReport) {
 
 TEST(ReportJson, HasNoMemberForStagesThatDidNotRun) {
   const Json json = Json::parse(render_report_json(small_report()));
-  for (const char* section : {"dense", "surface", "texture"}) {
+  for (const char* section : {"dense", "moving", "surface", "texture"}) {
     EXPECT_FALSE(json.contains(section)) << section;
   }
   EXPECT_TRUE(json["metres_per_unit"].is_null());
@@ -134,6 +134,15 @@ TEST(ReportJson, TellsOfDenseSurfaceAndTexture) {
   EXPECT_EQ(json["surface"]["largest_holes"][0]["perimeter"], 0.00123457);
   EXPECT_EQ(json["texture"]["psnr_db"], 24.57);
   EXPECT_TRUE(json["texture"]["ssim"].is_null());
+}
+
+TEST(ReportJson, TellsWhereSomethingMoved) {
+  ReconstructionReport report = small_report();
+  report.moving = MovingSection{.images = {{"a.jpg", 0.12345}}, .masked_ratio = 0.0618};
+  const Json json = Json::parse(render_report_json(report));
+  EXPECT_EQ(json["moving"]["images"][0]["name"], "a.jpg");
+  EXPECT_EQ(json["moving"]["images"][0]["masked_ratio"], 0.123);
+  EXPECT_EQ(json["moving"]["masked_ratio"], 0.062);
 }
 
 TEST(ReportJson, HoldsEmptyListsForAnEmptyReport) {

@@ -80,6 +80,9 @@ TEST(BuildOptions, NamesComeBackAndValuesAreChecked) {
        {QualityPreset::kPreview, QualityPreset::kStandard, QualityPreset::kFine}) {
     EXPECT_EQ(quality_preset_from_string(to_string(preset)), preset);
   }
+  for (const MovingUse use : {MovingUse::kAuto, MovingUse::kOff}) {
+    EXPECT_EQ(moving_use_from_string(to_string(use)), use);
+  }
   EXPECT_FALSE(last_stage_from_string("poisson"));
   EXPECT_FALSE(BuildOptions{.max_faces = -1}.validate());
   EXPECT_FALSE(BuildOptions{.map_side_px = 10}.validate());
