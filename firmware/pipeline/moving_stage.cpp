@@ -19,16 +19,12 @@ namespace trigmesh {
 
 namespace {
 
-// Longer side of the pictures that are searched. Regions of a few hundred pixels are what there is
-// to find; their borders are drawn to two pixels of a photograph of a thousand.
-constexpr int kSearchSidePx = 480;
 // Raised with every change of the method: masks of before are then made again.
 constexpr std::uint64_t kMethodVersion = 1;
 constexpr double kHalfway = 127.0;
 
-double search_scale(const Camera& camera) {
-  return std::min(1.0,
-                  static_cast<double>(kSearchSidePx) / std::max(camera.width_px, camera.height_px));
+double search_scale(const Camera& camera, int side_px) {
+  return std::min(1.0, static_cast<double>(side_px) / std::max(camera.width_px, camera.height_px));
 }
 
 /// A picture, its mask and its map at the size of the search.
@@ -36,7 +32,7 @@ Result<MovingView> moving_view(const DenseInput& input, const DepthMaps& depth, 
   TM_ASSIGN_OR_RETURN(const ViewImage picture, input.images.load(i));
   TM_ASSIGN_OR_RETURN(const DepthMap map, depth.maps.load(i));
   const DenseView& dense = input.views[i];
-  const double scale = search_scale(dense.camera);
+  const double scale = search_scale(dense.camera, input.plan.moving_side_px);
   MovingView view;
   view.camera = scaled_pinhole(dense.camera,
                                scaled_side(dense.camera.width_px, scale),
@@ -138,7 +134,7 @@ Result<std::vector<EncodedMask>> find_moving(const DenseInput& input,
                                              const StageContext& context) {
   const std::size_t count = input.views.size();
   const std::uint64_t key =
-      content_hash(fmt::format("{} {} {}", depth.key, kMethodVersion, kSearchSidePx));
+      content_hash(fmt::format("{} {} {}", depth.key, kMethodVersion, input.plan.moving_side_px));
   if (auto masks = stored_masks(context, count, key)) {
     return std::move(*masks);
   }

@@ -21,7 +21,8 @@ using EncodedMask = std::optional<std::vector<std::uint8_t>>;
 
 /// Finds what moved while the photographs were taken (sfm/moving): one mask a view, of the size of
 /// its photograph; none where nothing moved. The masks are kept in the work folder under the key of
-/// the depth maps. kCancelled, kIo, kNoSpace, what the images return.
+/// the depth maps. `input.plan.moving_side_px` is not 0. kCancelled, kIo, kNoSpace, what the images
+/// return.
 [[nodiscard]] Result<std::vector<EncodedMask>> find_moving(const DenseInput& input,
                                                            const DepthMaps& depth,
                                                            const StageContext& context);

@@ -213,7 +213,8 @@ Result<> publish_masks(const Work& work, const std::vector<EncodedMask>& masks) 
 
 /// Looks for what moved; where it finds something, masks go into the model and into effect.
 Result<DepthMaps> leave_out_moving(Work& work, DepthMaps depth) {
-  if (work.input.options.build.moving == MovingUse::kOff) {
+  if (work.plan.moving_side_px == 0) {
+    TM_RETURN_IF_ERROR(publish_masks(work, std::vector<EncodedMask>(work.views.size())));
     return depth;
   }
   const DenseInput seen{work.scene, work.views, work.images, work.plan, work.input.options.seed};
