@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <limits>
+#include <numeric>
 #include <span>
 #include <utility>
 
@@ -19,6 +20,9 @@ constexpr int kComparedKeypoints = 2500;
 constexpr std::size_t kPartners = 24;
 // Distances that are pixels of a picture this wide grow with the picture.
 constexpr double kUsualSidePx = 480.0;
+
+// Fewer matches than this part of all are no reason to map again.
+constexpr double kMinDroppedRatio = 0.002;
 
 /// A registered image as sfm/moving compares it.
 ComparableView comparable_view(const View& view,
@@ -116,6 +120,13 @@ PairRecord without_moving(const PairRecord& pair,
   return kept;
 }
 
+std::size_t match_count(const std::vector<PairRecord>& pairs) {
+  return std::accumulate(
+      pairs.begin(), pairs.end(), std::size_t{0}, [](std::size_t sum, const PairRecord& pair) {
+        return sum + pair.geometry.inliers.size();
+      });
+}
+
 }  // namespace
 
 Result<std::optional<std::vector<PairRecord>>> drop_moving_matches(
@@ -137,15 +148,13 @@ Result<std::optional<std::vector<PairRecord>>> drop_moving_matches(
     const std::size_t i = comparison.images[k];
     moving[i] = moving_keypoints(images[i].features->features.keypoints, evidence[k], surroundings);
   });
-  const bool anything = std::any_of(moving.begin(), moving.end(), [](const auto& of_image) {
-    return std::find(of_image.begin(), of_image.end(), 1) != of_image.end();
-  });
-  if (!anything) {
-    return std::optional<std::vector<PairRecord>>();
-  }
   std::vector<PairRecord> kept;
   for (const PairRecord& pair : pairs) {
     kept.push_back(without_moving(pair, moving));
+  }
+  const auto all = static_cast<double>(match_count(pairs));
+  if (all - static_cast<double>(match_count(kept)) < kMinDroppedRatio * all) {
+    return std::optional<std::vector<PairRecord>>();
   }
   return std::optional(std::move(kept));
 }

@@ -12,8 +12,8 @@
 namespace trigmesh {
 
 /// The pairs without the matches of keypoints that lie on something which moved, as the poses of
-/// `scene` show it (its views are the images, in order); nothing when nothing moved. Few of these
-/// matches agree with the poses, by chance, but those that do become points in mid-air.
+/// `scene` show it (its views are the images, in order); nothing when there are hardly any. Few of
+/// these matches agree with the poses, by chance, but those that do become points in mid-air.
 /// kCancelled; kInvalidArgument: descriptors that do not fit.
 [[nodiscard]] Result<std::optional<std::vector<PairRecord>>> drop_moving_matches(
     const Scene& scene,
