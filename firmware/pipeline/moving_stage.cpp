@@ -20,7 +20,7 @@ namespace trigmesh {
 namespace {
 
 // Raised with every change of the method: masks of before are then made again.
-constexpr std::uint64_t kMethodVersion = 1;
+constexpr std::uint64_t kMethodVersion = 2;
 constexpr double kHalfway = 127.0;
 
 double search_scale(const Camera& camera, int side_px) {

@@ -24,6 +24,8 @@ constexpr std::size_t kMinAgreeingViews = 2;
 // Lines of hidden background are edges that a pose or map misses by a pixel: what a square of this
 // side does not fit into is dropped.
 constexpr int kThinPx = 3;
+// Neighbouring pixels of one surface differ by less than this part of their depth.
+constexpr float kLargestStep = 0.04F;
 // Side of the square by which pieces are widened to see which belong together.
 constexpr int kJoiningPx = 9;
 // Pixels at the border of a thing show some of both.
@@ -45,13 +47,64 @@ void draw_disc(const Keypoint& keypoint, cv::Mat& picture) {
   cv::circle(picture, center, radius, cv::Scalar(255), cv::FILLED);
 }
 
+/// The pixels of the surface around `start` that were not visited yet: neighbours whose depths
+/// differ by less than kLargestStep of the depth.
+void trace_surface(const cv::Mat& depth,
+                   cv::Point start,
+                   cv::Mat& visited,
+                   std::vector<cv::Point>& surface) {
+  surface.assign(1, start);
+  visited.at<std::uint8_t>(start) = 1;
+  const cv::Rect picture(cv::Point(), depth.size());
+  for (std::size_t i = 0; i < surface.size(); ++i) {
+    const cv::Point at = surface[i];
+    const float here = depth.at<float>(at);
+    for (const cv::Point step : {cv::Point(1, 0), {-1, 0}, {0, 1}, {0, -1}}) {
+      const cv::Point next = at + step;
+      if (!picture.contains(next) || visited.at<std::uint8_t>(next) != 0) {
+        continue;
+      }
+      const float there = depth.at<float>(next);
+      if (there > 0.0F && std::abs(there - here) <= kLargestStep * here) {
+        visited.at<std::uint8_t>(next) = 1;
+        surface.push_back(next);
+      }
+    }
+  }
+}
+
+/// Confirmed depth is what stood still; but a piece of surface smaller than a region may be an
+/// accident, and says nothing.
+cv::Mat large_surfaces(const cv::Mat& depth, const RegionOptions& options) {
+  const double min_area = options.min_area_ratio * static_cast<double>(depth.total());
+  cv::Mat large(depth.size(), CV_8UC1, cv::Scalar(0));
+  cv::Mat visited(depth.size(), CV_8UC1, cv::Scalar(0));
+  std::vector<cv::Point> surface;
+  for (int y = 0; y < depth.rows; ++y) {
+    for (int x = 0; x < depth.cols; ++x) {
+      if (visited.at<std::uint8_t>(y, x) != 0 || !(depth.at<float>(y, x) > 0.0F)) {
+        continue;
+      }
+      trace_surface(depth, {x, y}, visited, surface);
+      if (static_cast<double>(surface.size()) >= min_area) {
+        for (const cv::Point& at : surface) {
+          large.at<std::uint8_t>(at) = 255;
+        }
+      }
+    }
+  }
+  return large;
+}
+
 Evidence gather(const MovingView& view,
                 std::span<const FeatureEvidence> features,
                 cv::Mat hidden,
                 const RegionOptions& options) {
   Evidence evidence;
   const cv::Size size = view.rgb.size();
-  evidence.marks = {cv::Mat(size, CV_8UC1, cv::Scalar(0)), cv::Mat(size, CV_8UC1, cv::Scalar(0))};
+  evidence.marks = {cv::Mat(size, CV_8UC1, cv::Scalar(0)),
+                    cv::Mat(size, CV_8UC1, cv::Scalar(0)),
+                    cv::Mat(size, CV_8UC1, cv::Scalar(0))};
   const cv::Mat square(kThinPx, kThinPx, CV_8UC1, cv::Scalar(1));
   cv::morphologyEx(hidden, evidence.hidden, cv::MORPH_OPEN, square);
   for (const FeatureEvidence& feature : features) {
@@ -66,6 +119,7 @@ Evidence gather(const MovingView& view,
   evidence.marks.moving |= evidence.hidden;
   if (!view.depth.empty()) {
     evidence.marks.moving.setTo(0, view.depth > 0.0F);
+    evidence.marks.fixed = large_surfaces(view.depth, options);
   }
   return evidence;
 }

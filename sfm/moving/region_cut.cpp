@@ -28,8 +28,7 @@ constexpr double kPseudoCount = 8.0;
 
 bool is_free(const MovingView& view, const RegionMarks& marks, int x, int y) {
   const bool left_out = !view.mask.empty() && view.mask.at<std::uint8_t>(y, x) == 0;
-  const bool confirmed = !view.depth.empty() && view.depth.at<float>(y, x) > 0.0F;
-  return !left_out && (!confirmed || marks.moving.at<std::uint8_t>(y, x) != 0);
+  return !left_out && marks.fixed.at<std::uint8_t>(y, x) == 0;
 }
 
 float squared_difference(const cv::Mat& rgb, cv::Point a, cv::Point b) {

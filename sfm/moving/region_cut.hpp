@@ -14,7 +14,8 @@ namespace trigmesh {
 /// Marks for the pixels of a view, CV_8UC1 of its size.
 struct RegionMarks {
   cv::Mat moving;   ///< 255: evidence that it moved
-  cv::Mat settled;  ///< 255: it stood still
+  cv::Mat settled;  ///< 255: evidence that it stood still
+  cv::Mat fixed;    ///< 255: it stood still, whatever speaks against it
 };
 
 /// How much more often a colour is found where things moved than elsewhere, learned from all views.
@@ -37,8 +38,7 @@ class ColorPreference {
 
 /// The pixels (CV_8UC1, 255) on the moving side of the cheapest border: it keeps to the marks, runs
 /// along edges of the picture and prefers the colours of what moved (Y. Boykov, M.-P. Jolly,
-/// "Interactive graph cuts for optimal boundary and region segmentation", ICCV 2001). Pixels with a
-/// confirmed depth are settled.
+/// "Interactive graph cuts for optimal boundary and region segmentation", ICCV 2001).
 [[nodiscard]] cv::Mat cut_region(const MovingView& view,
                                  const RegionMarks& marks,
                                  const ColorPreference& preference);

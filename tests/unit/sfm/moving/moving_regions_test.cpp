@@ -3,6 +3,7 @@
 #include <thread>
 
 #include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
 
 #include "tests/unit/sfm/moving/moving_scene.hpp"
 
@@ -72,6 +73,19 @@ TEST(MovingRegions, AreEmptyWhenAllStandsStill) {
   EXPECT_TRUE(all_empty(find_in(test::make_moving_scene({.plate = test::PlateKind::kNone}))));
   EXPECT_TRUE(
       all_empty(find_in(test::make_moving_scene({.plate = test::PlateKind::kPlainStanding}))));
+}
+
+TEST(MovingRegions, SwallowSpecksOfDepthButNotSurfaces) {
+  test::MovingScene scene = test::make_moving_scene({});
+  const cv::Rect board = cv::boundingRect(scene.truth[1]);
+  const cv::Rect speck(board.x, board.y + 30, 4, 4);  // at the border: no hole
+  const cv::Rect surface(board.x + 20, board.y + 20, 30, 30);
+  scene.views[1].depth(speck).setTo(3.2F);
+  scene.views[1].depth(surface).setTo(3.2F);
+  const cv::Mat mask = find_in(scene)[1];
+  ASSERT_FALSE(mask.empty());
+  EXPECT_EQ(cv::countNonZero(mask(speck)), speck.area());
+  EXPECT_LT(cv::countNonZero(mask(surface)), surface.area() / 4);
 }
 
 TEST(MovingRegions, StayOutOfGivenMasks) {

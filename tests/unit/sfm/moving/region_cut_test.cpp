@@ -17,7 +17,9 @@ Field make_field() {
   Field made;
   made.view.rgb = cv::Mat(40, 60, CV_8UC3, cv::Scalar(120, 120, 120));
   made.view.rgb(made.field).setTo(cv::Scalar(200, 40, 40));
-  made.marks = {cv::Mat(40, 60, CV_8UC1, cv::Scalar(0)), cv::Mat(40, 60, CV_8UC1, cv::Scalar(0))};
+  made.marks = {cv::Mat(40, 60, CV_8UC1, cv::Scalar(0)),
+                cv::Mat(40, 60, CV_8UC1, cv::Scalar(0)),
+                cv::Mat(40, 60, CV_8UC1, cv::Scalar(0))};
   made.marks.moving(cv::Rect(22, 15, 5, 5)).setTo(255);
   return made;
 }
@@ -36,10 +38,9 @@ TEST(RegionCut, GrowsFromAMarkToTheEdgesOfThePicture) {
   EXPECT_EQ(cv::countNonZero(region != expected), 0);
 }
 
-TEST(RegionCut, StopsAtConfirmedDepth) {
+TEST(RegionCut, StopsAtWhatIsFixed) {
   Field field = make_field();
-  field.view.depth = cv::Mat(40, 60, CV_32FC1, cv::Scalar(0));
-  field.view.depth(cv::Rect(30, 0, 30, 40)).setTo(2.0F);
+  field.marks.fixed(cv::Rect(30, 0, 30, 40)).setTo(255);
   const cv::Mat region = cut_region(field.view, field.marks, preference_of(field));
   EXPECT_EQ(cv::countNonZero(region(cv::Rect(30, 0, 30, 40))), 0);
   EXPECT_EQ(cv::countNonZero(region), 20 * 20);
