@@ -13,6 +13,7 @@ constexpr std::array kLastStages{
     LastStage::kSparse, LastStage::kDense, LastStage::kMesh, LastStage::kTexture};
 constexpr std::array kPresets{
     QualityPreset::kPreview, QualityPreset::kStandard, QualityPreset::kFine};
+constexpr std::array kMovingUses{MovingUse::kAuto, MovingUse::kOff};
 
 }  // namespace
 
@@ -48,6 +49,14 @@ std::string_view to_string(QualityPreset preset) {
 
 std::optional<QualityPreset> quality_preset_from_string(std::string_view name) {
   return named_value(kPresets, name);
+}
+
+std::string_view to_string(MovingUse use) {
+  return use == MovingUse::kAuto ? "auto" : "off";
+}
+
+std::optional<MovingUse> moving_use_from_string(std::string_view name) {
+  return named_value(kMovingUses, name);
 }
 
 Result<> BuildOptions::validate() const {

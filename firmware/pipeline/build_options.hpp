@@ -25,6 +25,16 @@ enum class QualityPreset {
 [[nodiscard]] std::string_view to_string(QualityPreset preset);
 [[nodiscard]] std::optional<QualityPreset> quality_preset_from_string(std::string_view name);
 
+/// What becomes of things that moved while the photographs were taken.
+enum class MovingUse {
+  kAuto,  ///< they are looked for in the depth maps and left out of everything after these
+  kOff,   ///< they are not looked for
+};
+
+/// "auto", "off".
+[[nodiscard]] std::string_view to_string(MovingUse use);
+[[nodiscard]] std::optional<MovingUse> moving_use_from_string(std::string_view name);
+
 /// Settings of the stages after mapping.
 struct BuildOptions {
   LastStage last_stage = LastStage::kTexture;
@@ -36,6 +46,7 @@ struct BuildOptions {
   int map_side_px = 0;
   /// Largest side of a texture page, pixels, a power of two in [256, 16384].
   int texture_size_px = 4096;
+  MovingUse moving = MovingUse::kAuto;
 
   [[nodiscard]] Result<> validate() const;
 };

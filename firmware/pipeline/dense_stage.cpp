@@ -138,11 +138,40 @@ Result<std::vector<DepthMap>> load_maps(const DepthMapSource& maps,
   return loaded;
 }
 
-Result<PosedDepthMap> load_posed(const DepthMapSource& maps,
-                                 std::span<const DenseView> views,
-                                 std::size_t view) {
-  TM_ASSIGN_OR_RETURN(DepthMap map, maps.load(view));
-  return PosedDepthMap{std::move(map), views[view].cam_from_world};
+/// What the filter of a view works on.
+struct FilterInput {
+  const DenseInput& dense;
+  std::span<const StereoPlan> plans;
+  std::span<const StereoImage> images;
+  const DepthMapSource& maps;  ///< unfiltered
+};
+
+/// The map of a view as far as the mask leaves it in.
+Result<PosedDepthMap> load_posed(const FilterInput& input, std::size_t view) {
+  TM_ASSIGN_OR_RETURN(DepthMap map, input.maps.load(view));
+  if (!map.depth.empty() && !input.images[view].mask.empty()) {
+    map.depth.setTo(0.0F, input.images[view].mask == 0);
+  }
+  return PosedDepthMap{std::move(map), input.dense.views[view].cam_from_world};
+}
+
+Result<DepthMap> filtered_map(const FilterInput& input,
+                              std::size_t view,
+                              const StageContext& context) {
+  TM_ASSIGN_OR_RETURN(const PosedDepthMap map, load_posed(input, view));
+  std::vector<PosedDepthMap> neighbors;
+  for (const std::size_t neighbor : input.plans[view].neighbors) {
+    TM_ASSIGN_OR_RETURN(PosedDepthMap other, load_posed(input, neighbor));
+    neighbors.push_back(std::move(other));
+  }
+  return filter_depth_map(
+      map, input.images[view].mask, neighbors, input.dense.plan.filter, context.executor);
+}
+
+std::uint64_t key_of_all(const std::vector<std::uint64_t>& keys) {
+  BinaryWriter all;
+  all.items(keys);
+  return content_hash(all.take());
 }
 
 /// Stereo of one view with its sources, at `scale` times the size of `images`.
@@ -237,7 +266,7 @@ Result<DepthMaps> make_depth_maps(const DenseInput& input, const StageContext& c
                               context.executor);
   }));
 
-  const DepthMapStore geometric(context.checkpoints, "geometric", geometric_key);
+  DepthMapStore geometric(context.checkpoints, "geometric", geometric_key);
   TM_RETURN_IF_ERROR(rounds.run(geometric, [&](std::size_t view) -> Result<DepthMap> {
     StereoProblem problem = problem_of(view, plans[view], images, 1.0);
     TM_ASSIGN_OR_RETURN(problem.initial, photometric.load(view));
@@ -245,21 +274,41 @@ Result<DepthMaps> make_depth_maps(const DenseInput& input, const StageContext& c
     return estimate_depth_map(problem, options, context.executor);
   }));
 
-  DepthMaps result{DepthMapStore(context.checkpoints, "depth", filtered_key), {}, 0};
-  TM_RETURN_IF_ERROR(rounds.run(result.maps, [&](std::size_t view) -> Result<DepthMap> {
-    TM_ASSIGN_OR_RETURN(const PosedDepthMap map, load_posed(geometric, input.views, view));
-    std::vector<PosedDepthMap> neighbors;
-    for (const std::size_t neighbor : plans[view].neighbors) {
-      TM_ASSIGN_OR_RETURN(PosedDepthMap other, load_posed(geometric, input.views, neighbor));
-      neighbors.push_back(std::move(other));
-    }
-    return filter_depth_map(map, images[view].mask, neighbors, input.plan.filter, context.executor);
+  DepthMapStore filtered(context.checkpoints, "depth", filtered_key);
+  TM_RETURN_IF_ERROR(rounds.run(filtered, [&](std::size_t view) {
+    return filtered_map({input, plans, images, geometric}, view, context);
   }));
-  result.stereo = std::move(plans);
-  BinaryWriter keys;
-  keys.items(filtered_key);
-  result.key = content_hash(keys.take());
-  return result;
+  return DepthMaps{
+      std::move(filtered), std::move(geometric), std::move(plans), key_of_all(filtered_key)};
+}
+
+Result<DepthMaps> filter_masked(const DenseInput& input,
+                                DepthMaps depth,
+                                const StageContext& context) {
+  TM_ASSIGN_OR_RETURN(const std::vector<StereoImage> images, load_stereo_images(input, context));
+  std::vector<std::uint64_t> with_mask;
+  for (std::size_t view = 0; view < input.views.size(); ++view) {
+    TM_ASSIGN_OR_RETURN(const std::uint64_t content, input.images.content(view));
+    with_mask.push_back(content_hash(fmt::format("{} {}", depth.key, content)));
+  }
+  const std::vector<std::uint64_t> keys = next_keys(with_mask, depth.stereo);
+  DepthMapStore masked(context.checkpoints, "masked", keys);
+  for (std::size_t view = 0; view < input.views.size(); ++view) {
+    if (context.stop.stop_requested()) {
+      return fail(ErrorCode::kCancelled,
+                  "stopped while masking depth maps; finished maps are kept");
+    }
+    if (!masked.has(view)) {
+      TM_ASSIGN_OR_RETURN(
+          const DepthMap map,
+          can_have_map(depth.stereo[view])
+              ? filtered_map({input, depth.stereo, images, depth.unfiltered}, view, context)
+              : Result<DepthMap>(DepthMap{}));
+      TM_RETURN_IF_ERROR(masked.save(view, map));
+    }
+  }
+  return DepthMaps{
+      std::move(masked), std::move(depth.unfiltered), std::move(depth.stereo), key_of_all(keys)};
 }
 
 Result<DenseCloud> fuse_maps(const DenseInput& input,

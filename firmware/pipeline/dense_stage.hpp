@@ -29,6 +29,7 @@ struct DenseInput {
 /// The finished depth maps: filtered, on disk, and what they were made from.
 struct DepthMaps {
   DepthMapStore maps;
+  DepthMapStore unfiltered;        ///< of the geometric round
   std::vector<StereoPlan> stereo;  ///< per view
   std::uint64_t key = 0;           ///< of all maps together
 };
@@ -38,6 +39,12 @@ struct DepthMaps {
 /// shares enough with another), kIo, kNoSpace, what the images return.
 [[nodiscard]] Result<DepthMaps> make_depth_maps(const DenseInput& input,
                                                 const StageContext& context);
+
+/// The maps filtered again after masks were added: `input.images` leaves out what `depth` was made
+/// with. What the masks leave out confirms nothing in other maps. Errors as above.
+[[nodiscard]] Result<DepthMaps> filter_masked(const DenseInput& input,
+                                              DepthMaps depth,
+                                              const StageContext& context);
 
 /// One cloud of the maps. Errors as above.
 [[nodiscard]] Result<DenseCloud> fuse_maps(const DenseInput& input,

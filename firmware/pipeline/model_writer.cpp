@@ -92,12 +92,18 @@ Result<> extend_model(ModelPlace& place,
                       std::span<const NamedFile> files,
                       std::span<const Scene> components,
                       const ReconstructionReport& report,
-                      const ReportAttachments& attachments) {
+                      const ReportAttachments& attachments,
+                      std::string_view renewed_folder) {
   const StagedFolder staged(place.staged());
   TM_RETURN_IF_ERROR(make_directory(staged.path()));
   TM_RETURN_IF_ERROR(link_tree(place.model(), staged.path()));
+  if (!renewed_folder.empty()) {
+    std::error_code ignored;  // a left-over is seen as such by its name
+    std::filesystem::remove_all(staged.path() / renewed_folder, ignored);
+  }
   // Files are replaced by rename, so the linked ones of the old model keep their bytes.
   for (const NamedFile& file : files) {
+    TM_RETURN_IF_ERROR(make_directory((staged.path() / file.name).parent_path()));
     TM_RETURN_IF_ERROR(write_file_atomically(staged.path() / file.name, file.bytes));
   }
   TM_RETURN_IF_ERROR(write_reports(staged.path(), components, report, attachments));

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "firmware/base/result.hpp"
@@ -24,12 +25,14 @@ namespace trigmesh {
 
 /// Adds files to the model at its place, or replaces those of the same name, and renews the
 /// reports, in one step: a reader sees the model as it was or with all of them. What else is in the
-/// folder stays. kIo, kNoSpace.
+/// folder stays, but for older files of `renewed_folder`, when one is named: `files` have all that
+/// belongs there. kIo, kNoSpace.
 [[nodiscard]] Result<> extend_model(ModelPlace& place,
                                     std::span<const NamedFile> files,
                                     std::span<const Scene> components,
                                     const ReconstructionReport& report,
-                                    const ReportAttachments& attachments = {});
+                                    const ReportAttachments& attachments = {},
+                                    std::string_view renewed_folder = {});
 
 /// Where part `index` of a model lies: the main one in `model` itself, the others below it.
 [[nodiscard]] std::filesystem::path component_folder(const std::filesystem::path& model,

@@ -14,14 +14,15 @@ enum class Stage {
   kMatch,         ///< pairs -> verified matches
   kMap,           ///< images -> poses and points
   kDepth,         ///< views -> depth maps
+  kMoving,        ///< depth maps and photographs -> masks of what moved
   kFuse,          ///< depth maps -> dense cloud
   kSurface,       ///< depth maps -> mesh
   kTexture,       ///< mesh and views -> textured mesh
   kWrite,         ///< model and report -> files
 };
 
-/// "video", "frames", "features", "pairs", "matching", "mapping", "depth", "fusion", "surface",
-/// "texture", "writing".
+/// "video", "frames", "features", "pairs", "matching", "mapping", "depth", "moving", "fusion",
+/// "surface", "texture", "writing".
 [[nodiscard]] std::string_view to_string(Stage stage);
 
 /// How far a stage is. `total` may be 0 while it is not known.

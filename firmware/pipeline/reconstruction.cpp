@@ -12,6 +12,7 @@
 #include "firmware/pipeline/matching_stage.hpp"
 #include "firmware/pipeline/memory_plan.hpp"
 #include "firmware/pipeline/model_writer.hpp"
+#include "firmware/pipeline/moving_matches.hpp"
 #include "firmware/pipeline/stopwatch.hpp"
 #include "firmware/pipeline/surface_building.hpp"
 #include "firmware/pipeline/worker_pool.hpp"
@@ -170,6 +171,8 @@ std::string_view to_string(Stage stage) {
       return "mapping";
     case Stage::kDepth:
       return "depth";
+    case Stage::kMoving:
+      return "moving";
     case Stage::kFuse:
       return "fusion";
     case Stage::kSurface:
@@ -261,12 +264,34 @@ Result<MappedPhotos> map_features(const Run& run,
                                   const StageContext& context) {
   const auto& [images, cameras] = features;
   const MapperOptions mapper = mapper_options(run.options);
-  auto mapped = run.options.poses
-                    ? map_known_poses(
-                          run.photos, images, cameras, pairs, {*run.options.poses, mapper}, context)
-                    : map_photos(run.photos, images, cameras, pairs, mapper, context);
-  run.stopwatch.finish(Stage::kMap);
-  return mapped;
+  return run.options.poses
+             ? map_known_poses(
+                   run.photos, images, cameras, pairs, {*run.options.poses, mapper}, context)
+             : map_photos(run.photos, images, cameras, pairs, mapper, context);
+}
+
+std::size_t registered_count(const MappedPhotos& mapped) {
+  return mapped.components.empty() ? 0 : mapped.components.front().registered_count();
+}
+
+/// Maps, and if the poses show that something moved, maps again without its matches. A second
+/// model that holds fewer images is no gain.
+Result<MappedPhotos> map_what_stood_still(const Run& run,
+                                          const PhotoFeatures& features,
+                                          const std::vector<PairRecord>& pairs,
+                                          const StageContext& context) {
+  TM_ASSIGN_OR_RETURN(MappedPhotos mapped, map_features(run, features, pairs, context));
+  if (run.options.build.moving == MovingUse::kOff || mapped.components.empty()) {
+    return mapped;
+  }
+  TM_ASSIGN_OR_RETURN(
+      const auto still,
+      drop_moving_matches(mapped.components.front(), features.images, pairs, context));
+  if (!still) {
+    return mapped;
+  }
+  TM_ASSIGN_OR_RETURN(MappedPhotos again, map_features(run, features, *still, context));
+  return registered_count(again) >= registered_count(mapped) ? std::move(again) : std::move(mapped);
 }
 
 Result<ReconstructionSummary> run_stages(const Run& run) {
@@ -276,7 +301,9 @@ Result<ReconstructionSummary> run_stages(const Run& run) {
   const StageContext context{pool, run.checkpoints, run.listener, run.stop};
   TM_ASSIGN_OR_RETURN(const PhotoFeatures features, extract(run, plan));
   TM_ASSIGN_OR_RETURN(const auto pairs, match(run, features, context));
-  TM_ASSIGN_OR_RETURN(const MappedPhotos mapped, map_features(run, features, pairs, context));
+  TM_ASSIGN_OR_RETURN(const MappedPhotos mapped,
+                      map_what_stood_still(run, features, pairs, context));
+  run.stopwatch.finish(Stage::kMap);
 
   run.listener.on_progress({Stage::kWrite, 0, 1});
   ReconstructionSummary summary{

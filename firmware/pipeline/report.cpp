@@ -367,6 +367,7 @@ ReconstructionReport build_report(const ReportInput& input) {
   report.metres_per_unit = input.metres_per_unit;
   report.units_sentence = units_sentence(input.metres_per_unit);
   report.dense = input.dense;
+  report.moving = input.moving;
   report.surface = input.surface;
   report.texture = input.texture;
   report.finish = input.finish;

@@ -87,6 +87,7 @@ struct ReportInput {
   std::string input_description;          ///< e.g. "folder fountain, 11 photographs"
   std::optional<double> metres_per_unit;  ///< > 0, when the scale is known
   std::optional<DenseSection> dense;      ///< of the main component, like the next three
+  std::optional<MovingSection> moving;
   std::optional<SurfaceSection> surface;
   std::optional<TextureSection> texture;
   std::optional<FinishSection> finish;
@@ -153,6 +154,7 @@ struct ReconstructionReport {
   Histogram track_length;             ///< images per point
   Histogram triangulation_angle_deg;  ///< per point: the largest angle between two of its rays
   std::optional<DenseSection> dense;
+  std::optional<MovingSection> moving;
   std::optional<SurfaceSection> surface;
   std::optional<TextureSection> texture;
   std::optional<FinishSection> finish;

@@ -190,6 +190,10 @@ Json to_json(const FinishGap& gap) {
   };
 }
 
+Json to_json(const MovingImage& image) {
+  return {{"name", image.name}, {"masked_ratio", rounded(image.masked_ratio, kRatioDigits)}};
+}
+
 template <typename T>
 Json list(const std::vector<T>& values) {
   Json array = Json::array();
@@ -197,6 +201,13 @@ Json list(const std::vector<T>& values) {
     array.push_back(to_json(value));
   }
   return array;
+}
+
+Json to_json(const MovingSection& moving) {
+  return {
+      {"images", list(moving.images)},
+      {"masked_ratio", rounded(moving.masked_ratio, kRatioDigits)},
+  };
 }
 
 Json to_json(const SurfaceSection& surface) {
@@ -286,6 +297,7 @@ std::string render_report_json(const ReconstructionReport& report) {
       {"settings", list(report.settings)},
   };
   add_section(document, "dense", report.dense);
+  add_section(document, "moving", report.moving);
   add_section(document, "surface", report.surface);
   add_section(document, "texture", report.texture);
   add_section(document, "finish", report.finish);

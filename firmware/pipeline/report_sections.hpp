@@ -49,6 +49,18 @@ struct OpenHole {
   double perimeter = 0.0;
 };
 
+/// A photograph in which something moved.
+struct MovingImage {
+  std::string name;
+  double masked_ratio = 0.0;  ///< pixels of its mask, of all, (0, 1]
+};
+
+/// What was found to have moved between the photographs, and is left out of what follows.
+struct MovingSection {
+  std::vector<MovingImage> images{};  ///< with a mask, in the order of the views
+  double masked_ratio = 0.0;          ///< pixels of masks, mean over all views, [0, 1]
+};
+
 /// The triangle mesh.
 struct SurfaceSection {
   std::size_t vertices = 0;

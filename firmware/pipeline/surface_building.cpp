@@ -1,9 +1,11 @@
 #include "firmware/pipeline/surface_building.hpp"
 
 #include <algorithm>
+#include <filesystem>
 #include <numeric>
 #include <optional>
 #include <string_view>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -16,6 +18,7 @@
 #include "firmware/pipeline/dense_stage.hpp"
 #include "firmware/pipeline/finish.hpp"
 #include "firmware/pipeline/model_writer.hpp"
+#include "firmware/pipeline/moving_stage.hpp"
 #include "firmware/pipeline/photo_images.hpp"
 #include "firmware/pipeline/surface_plan.hpp"
 #include "sfm/coverage/surface_coverage.hpp"
@@ -45,6 +48,13 @@ struct Work {
   SurfacePlan plan;
   std::vector<DepthPicture> pictures{};  ///< for the page
   std::string glb{};                     ///< likewise
+  PhotoSet masked_photos{};              ///< what moved is left out; set when something did
+  std::optional<PhotoImages> masked_images{};
+
+  /// The photographs as the stages after the depth maps use them.
+  [[nodiscard]] const PhotoImages& photographs() const {
+    return masked_images ? *masked_images : images;
+  }
 };
 
 void warn(ReconstructionReport& report, const std::vector<std::string>& sentences) {
@@ -60,13 +70,16 @@ Result<> check_not_stopped(const StageContext& context, const char* what) {
   return {};
 }
 
-Result<> publish(const Work& work, const std::vector<NamedFile>& files) {
+Result<> publish(const Work& work,
+                 const std::vector<NamedFile>& files,
+                 std::string_view renewed_folder = {}) {
   return extend_model(
       work.input.place,
       files,
       work.input.components,
       work.report,
-      {.glb = work.glb, .glb_name = "textured.glb", .depth_pictures = work.pictures});
+      {.glb = work.glb, .glb_name = "textured.glb", .depth_pictures = work.pictures},
+      renewed_folder);
 }
 
 /// What the checkpoint of the cloud holds: a hash of its file.
@@ -194,22 +207,62 @@ Result<TriangleMesh> preview_mesh(Work& work) {
   return add_mesh(work, std::move(made));
 }
 
+/// Masks of this run into the model, those of an earlier one out of it.
+Result<> publish_masks(const Work& work, const std::vector<EncodedMask>& masks) {
+  const std::vector<NamedFile> files = mask_files(work.views, masks);
+  std::error_code error;
+  if (files.empty() && !std::filesystem::exists(work.input.place.model() / "masks", error)) {
+    return {};
+  }
+  return publish(work, files, "masks");
+}
+
+/// Looks for what moved; where it finds something, masks go into the model and into effect.
+Result<DepthMaps> leave_out_moving(Work& work, DepthMaps depth) {
+  if (work.plan.moving_side_px == 0) {
+    TM_RETURN_IF_ERROR(publish_masks(work, std::vector<EncodedMask>(work.views.size())));
+    return depth;
+  }
+  const DenseInput seen{work.scene, work.views, work.images, work.plan, work.input.options.seed};
+  TM_ASSIGN_OR_RETURN(const auto masks, find_moving(seen, depth, work.context));
+  TM_ASSIGN_OR_RETURN(work.report.moving, sum_up_masks(work.views, masks));
+  TM_RETURN_IF_ERROR(publish_masks(work, masks));
+  if (work.report.moving->images.empty()) {
+    work.stopwatch.finish(Stage::kMoving);
+    return depth;
+  }
+  work.masked_photos = with_masks(work.input.photos, work.views, masks);
+  TM_ASSIGN_OR_RETURN(PhotoImages images,
+                      PhotoImages::create(work.masked_photos, work.scene, work.views));
+  work.masked_images.emplace(std::move(images));
+  auto masked = filter_masked(
+      {work.scene, work.views, *work.masked_images, work.plan, work.input.options.seed},
+      std::move(depth),
+      work.context);
+  work.stopwatch.finish(Stage::kMoving);
+  return masked;
+}
+
 /// Depth maps, dense cloud, and the surface when it is wanted.
 Result<std::optional<TriangleMesh>> dense_mesh(Work& work) {
   const ReconstructionOptions& options = work.input.options;
-  const DenseInput input{work.scene, work.views, work.images, work.plan, options.seed};
-  TM_ASSIGN_OR_RETURN(const DepthMaps depth, make_depth_maps(input, work.context));
+  TM_ASSIGN_OR_RETURN(
+      DepthMaps all_depth,
+      make_depth_maps({work.scene, work.views, work.images, work.plan, options.seed},
+                      work.context));
   work.stopwatch.finish(Stage::kDepth);
+  TM_ASSIGN_OR_RETURN(const DepthMaps depth, leave_out_moving(work, std::move(all_depth)));
+  const DenseInput input{work.scene, work.views, work.photographs(), work.plan, options.seed};
   TM_RETURN_IF_ERROR(densify(work, input, depth));
   if (options.build.last_stage == LastStage::kDense) {
     return std::optional<TriangleMesh>();
   }
   TM_RETURN_IF_ERROR(check_not_stopped(work.context, "the surface"));
   work.context.listener.on_progress({Stage::kSurface, 0, 1});
-  TM_ASSIGN_OR_RETURN(
-      SurfaceResult made,
-      make_surface(
-          {work.views, &depth.maps, &work.images}, work.plan.surface, work.context.executor));
+  TM_ASSIGN_OR_RETURN(SurfaceResult made,
+                      make_surface({work.views, &depth.maps, &work.photographs()},
+                                   work.plan.surface,
+                                   work.context.executor));
   work.context.listener.on_progress({Stage::kSurface, 1, 1});
   TM_ASSIGN_OR_RETURN(TriangleMesh mesh, add_mesh(work, std::move(made)));
   return std::optional(std::move(mesh));
@@ -233,7 +286,8 @@ Result<> add_texture(Work& work, const TriangleMesh& mesh) {
   work.context.listener.on_progress({Stage::kTexture, 0, 1});
   TM_ASSIGN_OR_RETURN(
       const TextureResult made,
-      texture_surface(mesh, work.views, work.images, work.plan.texture, work.context.executor));
+      texture_surface(
+          mesh, work.views, work.photographs(), work.plan.texture, work.context.executor));
   work.report.texture = sum_up(made.report);
   warn(work.report, made.report.lowered_quality);
   work.context.executor.stop_point();

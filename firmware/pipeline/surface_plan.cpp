@@ -22,6 +22,13 @@ constexpr std::uint64_t kBytesPerPoint = 80;
 // Of the pixels of all maps about one in four becomes a point: the others are merged or dropped.
 constexpr std::uint64_t kMapPixelsPerPoint = 4;
 constexpr std::uint64_t kBytesPerFace = 400;
+// A picture that is searched for what moved: colours, depth, mask, evidence; and its keypoints. One
+// picture at a time for each thread is also a graph.
+constexpr std::uint64_t kBytesPerSearchPixel = 12;
+constexpr std::uint64_t kBytesPerSearchView = 1'000'000;
+constexpr std::uint64_t kBytesPerGraphPixel = 400;
+constexpr std::uint64_t kGraphs = 4;
+constexpr int kSearchSidePx = 480;
 constexpr int kSmallestSidePx = 160;
 constexpr double kScaleStep = 0.75;
 // The first round of stereo works at half the size of the maps, but not below this side.
@@ -143,6 +150,34 @@ Result<> shrink_maps(std::span<const DenseView> views, std::uint64_t limit, Surf
   return {};
 }
 
+std::uint64_t moving_bytes(std::span<const DenseView> views, int side_px) {
+  const double scale = std::min(1.0, static_cast<double>(side_px) / longest_side(views));
+  const PixelCounts pixels = count_pixels(views, scale);
+  return kBaseBytes + pixels.all_maps * kBytesPerSearchPixel + views.size() * kBytesPerSearchView +
+         kGraphs * pixels.largest_map * kBytesPerGraphPixel;
+}
+
+/// Searches smaller pictures, or none at all.
+void shrink_search(std::span<const DenseView> views, std::uint64_t limit, SurfacePlan& plan) {
+  const int wanted = plan.moving_side_px;
+  while (plan.moving_side_px >= kSmallestSidePx &&
+         moving_bytes(views, plan.moving_side_px) > limit) {
+    plan.moving_side_px = static_cast<int>(std::lround(plan.moving_side_px * kScaleStep));
+  }
+  if (plan.moving_side_px < std::min(wanted, kSmallestSidePx)) {
+    plan.moving_side_px = 0;
+    plan.lowered.emplace_back(
+        "to keep the memory limit, things that moved were not looked for; a mask for each "
+        "photograph leaves them out");
+  } else if (plan.moving_side_px != wanted) {
+    plan.lowered.push_back(fmt::format(
+        "to keep the memory limit, things that moved were looked for in pictures {} instead of {} "
+        "pixels wide",
+        plan.moving_side_px,
+        wanted));
+  }
+}
+
 Result<> shrink_texture(std::span<const DenseView> views, std::uint64_t limit, SurfacePlan& plan) {
   AtlasOptions& atlas = plan.texture.atlas;
   const int wanted_pages = atlas.max_pages;
@@ -190,9 +225,11 @@ Result<SurfacePlan> plan_surface(std::span<const DenseView> views,
   plan.surface.max_faces = options.max_faces > 0 ? static_cast<std::size_t>(options.max_faces)
                                                  : sizes_of(options.preset).max_faces;
   plan.surface.max_memory_bytes = kSurfaceBudget;
+  plan.moving_side_px = options.moving == MovingUse::kAuto ? kSearchSidePx : 0;
   plan.texture.atlas.page_size_px = options.texture_size_px;
   if (limit_bytes != 0 && options.preset != QualityPreset::kPreview) {
     TM_RETURN_IF_ERROR(shrink_maps(views, limit_bytes, plan));
+    shrink_search(views, limit_bytes, plan);
   }
   plan.first_round_scale = first_round_scale(views, plan.map_scale);
   if (limit_bytes == 0) {

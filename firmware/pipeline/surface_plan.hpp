@@ -23,6 +23,8 @@ struct SurfacePlan {
   double map_scale = 1.0;  ///< size of the depth maps / size of the pictures, (0, 1]
   /// Size of the maps of the first, photometric round / size of the depth maps, (0, 1].
   double first_round_scale = 1.0;
+  /// Longer side of the pictures that are searched for what moved, pixels; 0: they are not.
+  int moving_side_px = 0;
   ViewSelectionOptions selection;
   PatchMatchOptions patch_match;
   DepthFilterOptions filter;

@@ -169,6 +169,39 @@ Result<ViewImage> undistort_image(const ViewImage& image,
   return out;
 }
 
+Result<cv::Mat> distort_mask(const cv::Mat& mask,
+                             const Camera& pinhole,
+                             const Camera& camera,
+                             std::uint8_t outside) {
+  if (mask.type() != CV_8UC1 || mask.cols != pinhole.width_px || mask.rows != pinhole.height_px) {
+    return fail(ErrorCode::kInvalidArgument,
+                "mask of {}x{} pixels for a picture of {}x{}",
+                mask.cols,
+                mask.rows,
+                pinhole.width_px,
+                pinhole.height_px);
+  }
+  if (camera == pinhole) {
+    return mask;
+  }
+  cv::Mat result(camera.height_px, camera.width_px, CV_8UC1, cv::Scalar(outside));
+  for (int y = 0; y < result.rows; ++y) {
+    for (int x = 0; x < result.cols; ++x) {
+      const std::optional<Eigen::Vector2d> ray = normalize_pixel(camera, Eigen::Vector2d(x, y));
+      if (!ray) {
+        continue;
+      }
+      const double u = std::round(pinhole.fx_px * ray->x() + pinhole.cx_px);
+      const double v = std::round(pinhole.fy_px * ray->y() + pinhole.cy_px);
+      if (u >= 0.0 && v >= 0.0 && u < mask.cols && v < mask.rows) {
+        result.at<std::uint8_t>(y, x) =
+            mask.at<std::uint8_t>(static_cast<int>(v), static_cast<int>(u));
+      }
+    }
+  }
+  return result;
+}
+
 std::vector<DenseView> dense_views(const Scene& scene) {
   std::vector<DenseView> views;
   for (std::size_t v = 0; v < scene.views.size(); ++v) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include <opencv2/core/mat.hpp>
@@ -27,6 +28,15 @@ namespace trigmesh {
 [[nodiscard]] Result<ViewImage> undistort_image(const ViewImage& image,
                                                 const Camera& camera,
                                                 const Camera& pinhole);
+
+/// The way back for a mask: CV_8UC1 of the size of `camera`, each pixel the one of `mask` (CV_8UC1
+/// of the size of `pinhole`) that looks along the same ray, `outside` where there is none. When
+/// both are the same pinhole camera the mask is returned untouched, sharing its memory.
+/// kInvalidArgument: size or type.
+[[nodiscard]] Result<cv::Mat> distort_mask(const cv::Mat& mask,
+                                           const Camera& pinhole,
+                                           const Camera& camera,
+                                           std::uint8_t outside);
 
 /// The registered views of a scene with their undistorted cameras, in order.
 [[nodiscard]] std::vector<DenseView> dense_views(const Scene& scene);

@@ -31,8 +31,8 @@ INPUT is a folder of JPEG or PNG photographs, a text file with one path a line, 
 if there is one, timestamps.csv), or a video file, whose frames the program ffmpeg (Debian package ffmpeg) writes to
 OUTPUT/frames. Of a video or recording with 10 frames a second or more only keyframes are used: the sharpest frame of
 each stretch with enough motion; the report says of each frame why. The result is OUTPUT/model:
-sparse/ (COLMAP text), projections.txt, sparse.ply, dense.ply, mesh.ply, textured.glb, textured.obj, report.json and
-report.html. When interrupted, the same command goes on where it stopped.
+sparse/ (COLMAP text), projections.txt, sparse.ply, dense.ply, masks/ (where something moved), mesh.ply, textured.glb,
+textured.obj, report.json and report.html. When interrupted, the same command goes on where it stopped.
 )";
 
 /// The options as they come from the command line.

@@ -34,6 +34,14 @@ void add_surface_options(CLI::App& command, SurfaceArguments& arguments) {
       ->check(CLI::IsMember({"1024", "2048", "4096", "8192"}))
       ->capture_default_str();
   command
+      .add_option(
+          "--moving",
+          arguments.moving,
+          "Things that moved between the photographs: auto = find them and leave them out of "
+          "dense cloud, mesh and texture (masks/ of the model shows where), off = do not look")
+      ->check(CLI::IsMember({"auto", "off"}))
+      ->capture_default_str();
+  command
       .add_option("--threads",
                   arguments.threads,
                   "Threads that work; 0 = one a core. The result does not depend on it")
@@ -56,6 +64,7 @@ BuildOptions build_options_from(const SurfaceArguments& arguments, LastStage las
   options.preset = *quality_preset_from_string(arguments.preset);  // CLI11 has checked the names
   options.max_faces = arguments.max_faces;
   options.map_side_px = arguments.depth_size_px;
+  options.moving = *moving_use_from_string(arguments.moving);
   options.texture_size_px = arguments.texture_size_px;
   return options;
 }

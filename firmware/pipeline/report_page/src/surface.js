@@ -31,6 +31,23 @@ function denseCards(dense) {
   ];
 }
 
+function movingCards(moving) {
+  if (!moving) return [];
+  const hint = moving.images.length === 0 ? 'nothing moved that could be found' : `${percent(moving.masked_ratio)} of all pixels left out, see masks/`;
+  return [card(count(moving.images.length), 'Photographs with motion', hint)];
+}
+
+function movingTable(images) {
+  if (images.length === 0) return null;
+  const row = (image) => h('tr', null, h('th', { scope: 'row' }, image.name), h('td', { class: 'number' }, percent(image.masked_ratio)));
+  const head = h('tr', null, h('th', { scope: 'col' }, 'Photograph'), h('th', { scope: 'col', class: 'number' }, 'Left out'));
+  return [
+    h('h3', null, 'Where something moved'),
+    h('p', { class: 'muted' }, 'Left out of dense cloud, surface and texture; the masks are in the model, white where something moved.'),
+    h('div', { class: 'table-frame', tabindex: 0, role: 'region', 'aria-label': 'Photographs in which something moved' }, h('table', { class: 'narrow', id: 'moving' }, h('thead', null, head), h('tbody', null, images.map(row)))),
+  ];
+}
+
 function surfaceCards(surface, measure) {
   if (!surface) return [];
   const filled = surface.holes_filled > 0 ? `${plural(surface.holes_filled, 'small one')} filled` : 'none filled';
@@ -69,15 +86,16 @@ function loweredList(stages) {
 }
 
 export function buildSurface(report) {
-  const { dense, surface, texture } = report;
+  const { dense, moving, surface, texture } = report;
   if (!dense && !surface && !texture) return null;
   const measure = measures(report);
   return section(
     'surface',
     'Surface',
-    h('dl', { class: 'cards cards-inside' }, denseCards(dense), surfaceCards(surface, measure), textureCards(texture)),
+    h('dl', { class: 'cards cards-inside' }, denseCards(dense), movingCards(moving), surfaceCards(surface, measure), textureCards(texture)),
     loweredList([['depth maps', dense], ['surface', surface], ['texture', texture]]),
     holesTable(surface?.largest_holes ?? [], measure),
+    movingTable(moving?.images ?? []),
   );
 }
 

@@ -40,6 +40,18 @@ TEST_F(ExtendModel, KeepsWhatIsThereAndAddsOrReplaces) {
   EXPECT_FALSE(fs::exists(output_ / ".model.part"));
 }
 
+TEST_F(ExtendModel, RenewsAFolderAsAWhole) {
+  const ReconstructionReport report = build_report({});
+  ASSERT_TRUE(write_model(place_, std::vector<Scene>(1), report));
+  const std::vector<NamedFile> first{{"masks/left/a.png", "a"}, {"masks/b.png", "b"}};
+  ASSERT_TRUE(extend_model(place_, first, {}, report));
+  EXPECT_EQ(contents(output_ / "model/masks/left/a.png"), "a");
+  const std::vector<NamedFile> second{{"masks/b.png", "new"}};
+  ASSERT_TRUE(extend_model(place_, second, {}, report, {}, "masks"));
+  EXPECT_FALSE(fs::exists(output_ / "model/masks/left"));
+  EXPECT_EQ(contents(output_ / "model/masks/b.png"), "new");
+}
+
 TEST_F(ExtendModel, NeedsAModel) {
   const auto result = extend_model(place_, {}, {}, build_report({}));
   ASSERT_FALSE(result);

@@ -94,7 +94,7 @@ TEST(ReportJson, IsTheSameForTheSameReport) {
 
 TEST(ReportJson, HasNoMemberForStagesThatDidNotRun) {
   const Json json = Json::parse(render_report_json(small_report()));
-  for (const char* section : {"dense", "surface", "texture", "finish"}) {
+  for (const char* section : {"dense", "moving", "surface", "texture", "finish"}) {
     EXPECT_FALSE(json.contains(section)) << section;
   }
   EXPECT_TRUE(json["metres_per_unit"].is_null());
@@ -151,6 +151,15 @@ TEST(ReportJson, TellsWhatIsMissing) {
   EXPECT_EQ(finish["gaps"][0]["photograph"], "a.jpg");
   EXPECT_EQ(finish["gaps"][0]["turn_left_deg"], -40.0);
   EXPECT_EQ(finish["gaps"][0]["advice"], "go");
+}
+
+TEST(ReportJson, TellsWhereSomethingMoved) {
+  ReconstructionReport report = small_report();
+  report.moving = MovingSection{.images = {{"a.jpg", 0.12345}}, .masked_ratio = 0.0618};
+  const Json json = Json::parse(render_report_json(report));
+  EXPECT_EQ(json["moving"]["images"][0]["name"], "a.jpg");
+  EXPECT_EQ(json["moving"]["images"][0]["masked_ratio"], 0.123);
+  EXPECT_EQ(json["moving"]["masked_ratio"], 0.062);
 }
 
 TEST(ReportJson, HoldsEmptyListsForAnEmptyReport) {

@@ -63,6 +63,22 @@ TEST(PlanSurface, LowersQualityInStepsThatItTells) {
   }
 }
 
+TEST(PlanSurface, SearchesForWhatMovedInSmallerPicturesOrNotAtAll) {
+  const auto views = views_of(960, 720, 100);
+  const BuildOptions dense{.last_stage = LastStage::kDense};
+  const auto side = [&](std::uint64_t limit) {
+    return plan_surface(views, dense, limit)->moving_side_px;
+  };
+  EXPECT_EQ(side(0), 480);
+  EXPECT_EQ(side(1'000'000'000), 480);
+  EXPECT_LT(side(600'000'000), 480);
+  EXPECT_GE(side(600'000'000), 160);
+  EXPECT_EQ(side(260'000'000), 0);
+  EXPECT_THAT(plan_surface(views, dense, 260'000'000)->lowered,
+              testing::Contains(testing::HasSubstr("things that moved were not looked for")));
+  EXPECT_EQ(plan_surface(views, {.moving = MovingUse::kOff}, 0)->moving_side_px, 0);
+}
+
 TEST(PlanSurface, SaysWhenNoSettingIsSmallEnough) {
   const auto views = views_of(1536, 1024, 25);
   const auto plan = plan_surface(views, {}, 20'000'000);
@@ -79,6 +95,9 @@ TEST(BuildOptions, NamesComeBackAndValuesAreChecked) {
   for (const QualityPreset preset :
        {QualityPreset::kPreview, QualityPreset::kStandard, QualityPreset::kFine}) {
     EXPECT_EQ(quality_preset_from_string(to_string(preset)), preset);
+  }
+  for (const MovingUse use : {MovingUse::kAuto, MovingUse::kOff}) {
+    EXPECT_EQ(moving_use_from_string(to_string(use)), use);
   }
   EXPECT_FALSE(last_stage_from_string("poisson"));
   EXPECT_FALSE(BuildOptions{.max_faces = -1}.validate());

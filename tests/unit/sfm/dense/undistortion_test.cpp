@@ -84,6 +84,30 @@ TEST(Undistortion, MasksFollowTheirPixels) {
   EXPECT_EQ(out->mask.at<std::uint8_t>(row, center + 5), 255);
 }
 
+TEST(Undistortion, MasksFindTheWayBack) {
+  const Camera camera = lens(CameraModel::kRadial, {-0.2, 0.05, 0.0, 0.0});
+  const Camera pinhole = undistorted_camera(camera);
+  cv::Mat mask(pinhole.height_px, pinhole.width_px, CV_8UC1, cv::Scalar(0));
+  mask(cv::Rect(10, 10, 30, 20)).setTo(255);
+  const Result<cv::Mat> back = distort_mask(mask, pinhole, camera, 7);
+  ASSERT_TRUE(back.has_value());
+  ASSERT_EQ(back->size(), cv::Size(camera.width_px, camera.height_px));
+  int differing = 0;
+  for (int y = 0; y < mask.rows; ++y) {
+    for (int x = 0; x < mask.cols; ++x) {
+      const auto pixel = project(
+          camera, {(x - pinhole.cx_px) / pinhole.fx_px, (y - pinhole.cy_px) / pinhole.fy_px, 1.0});
+      const cv::Point at(static_cast<int>(std::lround(pixel->x())),
+                         static_cast<int>(std::lround(pixel->y())));
+      if (cv::Rect(0, 0, camera.width_px, camera.height_px).contains(at)) {
+        differing += back->at<std::uint8_t>(at) != mask.at<std::uint8_t>(y, x) ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_LT(differing, 2 * (30 + 20)) << "only the border may round to the other side";
+  EXPECT_EQ(distort_mask(mask, camera, camera, 0).error().code, ErrorCode::kInvalidArgument);
+}
+
 TEST(Undistortion, RefusesPicturesOfAnotherSize) {
   const Camera camera = lens(CameraModel::kPinhole, {});
   const ViewImage image{.rgb = cv::Mat(10, 10, CV_8UC3), .mask = {}};
