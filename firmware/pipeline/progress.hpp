@@ -12,6 +12,7 @@ enum class Stage {
   kSelectPairs,   ///< which images are worth comparing
   kMatch,         ///< pairs -> verified matches
   kMap,           ///< images -> poses and points
+  kScale,         ///< photographs with markers -> metres
   kDepth,         ///< views -> depth maps
   kFuse,          ///< depth maps -> dense cloud
   kSurface,       ///< depth maps -> mesh
@@ -19,8 +20,8 @@ enum class Stage {
   kWrite,         ///< model and report -> files
 };
 
-/// "frames", "features", "pairs", "matching", "mapping", "depth", "fusion", "surface", "texture",
-/// "writing".
+/// "frames", "features", "pairs", "matching", "mapping", "scale", "depth", "fusion", "surface",
+/// "texture", "writing".
 [[nodiscard]] std::string_view to_string(Stage stage);
 
 /// How far a stage is. `total` may be 0 while it is not known.

@@ -13,6 +13,7 @@
 #include "tools/trigmesh/command.hpp"
 #include "tools/trigmesh/interrupt.hpp"
 #include "tools/trigmesh/progress_printer.hpp"
+#include "tools/trigmesh/scale_arguments.hpp"
 #include "tools/trigmesh/surface_arguments.hpp"
 
 namespace trigmesh {
@@ -25,13 +26,17 @@ constexpr const char* kFooter = R"(Examples:
   trigmesh reconstruct recording --output model --match sequential --threads 2
   trigmesh reconstruct video --output model --frames keyframes
   trigmesh reconstruct photos --output model --preset preview
+  trigmesh reconstruct photos --output model --marker-side 100mm --up card
   trigmesh reconstruct list.txt --output model --stop-after sparse --memory-limit 500M
 
 INPUT is a folder of JPEG or PNG photographs, a text file with one path a line, or a recording (a folder with
 images/ and, if there is one, timestamps.csv). Of a recording with 10 frames a second or more only keyframes are used:
 the sharpest frame of each stretch with enough motion; the report says of each frame why. The result is OUTPUT/model:
 sparse/ (COLMAP text), projections.txt, sparse.ply, dense.ply, mesh.ply, textured.glb, textured.obj, report.json and
-report.html. When interrupted, the same command goes on where it stopped.
+report.html.
+With --marker-side or --known-distance lengths are metres when ArUco markers in the scene are seen well enough and
+agree; else everything is made in a unit of its own, and the exit code is 4. When interrupted, the same command goes on where
+it stopped.
 )";
 
 /// The options as they come from the command line.
@@ -49,6 +54,7 @@ struct ReconstructArguments {
   bool upright = false;
   bool no_upsample = false;
   bool no_masks = false;
+  ScaleArguments scale;
   SurfaceArguments surface;
 };
 
@@ -67,6 +73,7 @@ Result<ReconstructionOptions> options_from(const ReconstructArguments& arguments
   options.seed = arguments.surface.seed;
   options.build =
       build_options_from(arguments.surface, *last_stage_from_string(arguments.stop_after));
+  TM_ASSIGN_OR_RETURN(options.scale, scale_options_from(arguments.scale));
   options.software_version = TRIGMESH_VERSION;
   if (!arguments.camera_file.empty()) {
     TM_ASSIGN_OR_RETURN(const std::vector<CameraProfile> profiles,
@@ -83,6 +90,9 @@ Result<ReconstructionOptions> options_from(const ReconstructArguments& arguments
 
 void print_summary(const ReconstructionReport& report, const std::string& output) {
   fmt::print("{}\n", report.verdict_sentence);
+  if (!report.scale.empty()) {
+    fmt::print("{}\n", report.units_sentence);
+  }
   for (const ImageReport& image : report.images) {
     if (image.reason != RefusalReason::kNone) {
       fmt::print("  refused {}: {} - {}\n", image.name, to_string(image.reason), image.detail);
@@ -98,6 +108,17 @@ void print_summary(const ReconstructionReport& report, const std::string& output
       report.overall.mean_error_px,
       output,
       output);
+}
+
+/// Who gave a length wants metres.
+Result<> check_scale(const ReconstructionReport& report, const std::string& output) {
+  if (report.scale.empty() || report.metres_per_unit) {
+    return {};
+  }
+  return fail(ErrorCode::kInsufficientData,
+              "the model in {}/model has no scale, its lengths are in a unit of their own: {}",
+              output,
+              report.scale.front().problem);
 }
 
 Result<> run(const ReconstructArguments& arguments) {
@@ -125,7 +146,7 @@ Result<> run(const ReconstructArguments& arguments) {
                 arguments.input,
                 arguments.output);
   }
-  return {};
+  return check_scale(summary->report, arguments.output);
 }
 
 }  // namespace
@@ -186,6 +207,7 @@ void add_reconstruct_command(CLI::App& app, CommandContext& context) {
   command->add_option("--stop-after", arguments->stop_after, "Last stage")
       ->check(CLI::IsMember({"sparse", "dense", "mesh", "texture"}))
       ->capture_default_str();
+  add_scale_options(*command, arguments->scale);
   add_surface_options(*command, arguments->surface);
   command->footer(kFooter);
   command->callback([arguments, &context] { finish_command(context, run(*arguments)); });

@@ -5,6 +5,7 @@ import { createTooltip, h, section } from './dom.js';
 import { buildHistogram } from './histogram.js';
 import { buildImageTable } from './image_table.js';
 import { buildMatchMatrix } from './match_matrix.js';
+import { buildScale } from './scale.js';
 import { buildCameras, buildCards, buildHeader, buildNotes, buildSettings } from './summary.js';
 import { buildDepthMaps, buildSurface } from './surface.js';
 import { buildTimeline } from './timeline.js';
@@ -60,6 +61,7 @@ function build() {
       buildNotes(report.notes),
       buildCards(report),
       viewer?.element,
+      buildScale(report),
       buildSurface(report),
       buildDepthMaps(report, depthMaps, select),
       buildPlots(report, tooltip),
