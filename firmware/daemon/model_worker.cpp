@@ -1,6 +1,7 @@
 #include "firmware/daemon/model_worker.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <system_error>
 #include <utility>
@@ -33,6 +34,23 @@ QualityPreset preset_of(ReconstructionSettings::Preset preset) {
       break;
   }
   return QualityPreset::kFine;
+}
+
+/// What is known of markers. The dictionaries stand in the order of their bits, then their size.
+ScaleOptions scale_options(const ScaleSettings& settings) {
+  constexpr std::array kBits{4, 5, 6};
+  constexpr std::array kCounts{50, 100, 250, 1000};
+  const auto dictionary = static_cast<std::size_t>(settings.dictionary);
+  ScaleOptions options;
+  options.dictionary = {.bits = kBits.at(dictionary / kCounts.size()),
+                        .count = kCounts.at(dictionary % kCounts.size())};
+  if (settings.marker_side_m > 0.0) {
+    options.known.marker_side_m = settings.marker_side_m;
+  }
+  options.known.side_of_marker_m = settings.marker_sides_m;
+  options.known.distance_m = settings.marker_distances_m;
+  options.up = settings.up == ScaleSettings::Up::kCard ? UpSource::kCard : UpSource::kNone;
+  return options;
 }
 
 int thread_count(int wanted) {
@@ -72,6 +90,14 @@ std::string times_sentence(const std::vector<StageTime>& times) {
   return sentence;
 }
 
+/// Why the model has no scale although a length is known; or nothing.
+std::string scale_sentence(const ReconstructionReport& report) {
+  if (report.scale.empty() || report.scale.front().problem.empty()) {
+    return {};
+  }
+  return fmt::format(" It has no scale: {}.", report.scale.front().problem);
+}
+
 ModelOutcome outcome_of(const Error& error) {
   switch (error.code) {
     case ErrorCode::kCancelled:
@@ -91,7 +117,7 @@ ModelAnswer answer_of(const SessionManifest& manifest,
   ModelAnswer answer{manifest.id, ModelOutcome::kReady, {}};
   if (made) {
     answer.outcome = made->report.components.empty() ? ModelOutcome::kNone : ModelOutcome::kReady;
-    answer.message = made->report.verdict_sentence;
+    answer.message = made->report.verdict_sentence + scale_sentence(made->report);
     return answer;
   }
   answer.outcome = outcome_of(made.error());
@@ -141,10 +167,12 @@ Result<> ModelWorkerOptions::validate() const {
 }
 
 ModelWorkerOptions model_worker_options(const ReconstructionSettings& settings,
+                                        const ScaleSettings& scale,
                                         const std::string& software_version) {
   ModelWorkerOptions options;
   options.nice = settings.priority;
   ReconstructionOptions& reconstruction = options.reconstruction;
+  reconstruction.scale = scale_options(scale);
   reconstruction.build.preset = preset_of(settings.preset);
   reconstruction.num_threads = thread_count(settings.threads);
   reconstruction.memory_limit_bytes =

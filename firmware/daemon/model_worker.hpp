@@ -30,6 +30,7 @@ struct ModelWorkerOptions {
 
 /// What the settings say about models. 0 threads: one a core.
 [[nodiscard]] ModelWorkerOptions model_worker_options(const ReconstructionSettings& settings,
+                                                      const ScaleSettings& scale,
                                                       const std::string& software_version);
 
 /// Makes models with the pipeline, in a thread of its own, from the kept frames of a session and
