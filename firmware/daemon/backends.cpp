@@ -191,7 +191,7 @@ std::unique_ptr<ModelMaker> make_model_worker(const Settings& settings,
     tell({session_id, std::string(to_string(progress.stage)), progress.done, progress.total});
   };
   return std::make_unique<ModelWorker>(
-      model_worker_options(settings.reconstruction, TRIGMESH_VERSION),
+      model_worker_options(settings.reconstruction, settings.scale, TRIGMESH_VERSION),
       clock,
       ModelListeners{
           std::move(observer.on_answer), std::move(on_progress), std::move(observer.on_followed)});

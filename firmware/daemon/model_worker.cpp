@@ -1,6 +1,7 @@
 #include "firmware/daemon/model_worker.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <system_error>
 #include <utility>
@@ -26,6 +27,14 @@ std::string times_sentence(const std::vector<StageTime>& times) {
                             std::chrono::duration<double>(time.duration).count());
   }
   return sentence;
+}
+
+/// Why the model has no scale although a length is known; or nothing.
+std::string scale_sentence(const ReconstructionReport& report) {
+  if (report.scale.empty() || report.scale.front().problem.empty()) {
+    return {};
+  }
+  return fmt::format(" It has no scale: {}.", report.scale.front().problem);
 }
 
 ModelOutcome outcome_of(const Error& error) {
@@ -54,7 +63,7 @@ ModelAnswer answer_of(const SessionManifest& manifest,
   ModelAnswer answer{manifest.id, ModelOutcome::kReady, {}};
   if (made) {
     answer.outcome = made->report.components.empty() ? ModelOutcome::kNone : ModelOutcome::kReady;
-    answer.message = made->report.verdict_sentence;
+    answer.message = made->report.verdict_sentence + scale_sentence(made->report);
     return answer;
   }
   answer.outcome = outcome_of(made.error());
@@ -104,10 +113,11 @@ Result<> ModelWorkerOptions::validate() const {
 }
 
 ModelWorkerOptions model_worker_options(const ReconstructionSettings& settings,
+                                        const ScaleSettings& scale,
                                         const std::string& software_version) {
   ModelWorkerOptions options;
   options.nice = settings.priority;
-  options.reconstruction = model_options(settings, software_version);
+  options.reconstruction = model_options(settings, scale, software_version);
   return options;
 }
 

@@ -32,6 +32,7 @@ struct ModelWorkerOptions {
 
 /// What the settings say about models. 0 threads: one a core.
 [[nodiscard]] ModelWorkerOptions model_worker_options(const ReconstructionSettings& settings,
+                                                      const ScaleSettings& scale,
                                                       const std::string& software_version);
 
 /// Who hears of it. All but the first may be empty.

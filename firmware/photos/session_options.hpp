@@ -13,6 +13,7 @@ namespace trigmesh {
 
 /// What the settings of the rig say about models. 0 threads: one a core.
 [[nodiscard]] ReconstructionOptions model_options(const ReconstructionSettings& settings,
+                                                  const ScaleSettings& scale,
                                                   const std::string& software_version);
 
 /// What is known of the camera before the first picture: the camera of the session's profile

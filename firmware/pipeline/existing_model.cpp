@@ -43,7 +43,7 @@ ReportHistory history_of_scenes(const std::vector<Scene>& components) {
 }
 
 /// The report must speak of these scenes: each image with a pose is registered in it.
-Result<> check_same_images(const ReportHistory& history, const std::vector<Scene>& components) {
+Result<> check_same_scenes(const ReportHistory& history, const std::vector<Scene>& components) {
   std::set<std::string_view> told;
   for (const ImageOutcome& image : history.images) {
     told.insert(image.name);
@@ -55,13 +55,19 @@ Result<> check_same_images(const ReportHistory& history, const std::vector<Scene
       }
     }
   }
+  if (!history.scale.empty() && history.scale.size() != components.size()) {
+    return fail(ErrorCode::kCorruptData,
+                "it tells the scale of {} models, there are {}",
+                history.scale.size(),
+                components.size());
+  }
   return {};
 }
 
 Result<ReportHistory> read_history(const fs::path& file, const std::vector<Scene>& components) {
   TM_ASSIGN_OR_RETURN(const std::string text, read_file(file, kMaxReportBytes));
   TM_ASSIGN_OR_RETURN(ReportHistory history, parse_report_history(text));
-  TM_RETURN_IF_ERROR(check_same_images(history, components));
+  TM_RETURN_IF_ERROR(check_same_scenes(history, components));
   return history;
 }
 

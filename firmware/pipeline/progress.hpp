@@ -13,6 +13,7 @@ enum class Stage {
   kSelectPairs,   ///< which images are worth comparing
   kMatch,         ///< pairs -> verified matches
   kMap,           ///< images -> poses and points
+  kScale,         ///< photographs with markers -> metres
   kDepth,         ///< views -> depth maps
   kMoving,        ///< depth maps and photographs -> masks of what moved
   kFuse,          ///< depth maps -> dense cloud
@@ -21,8 +22,8 @@ enum class Stage {
   kWrite,         ///< model and report -> files
 };
 
-/// "video", "frames", "features", "pairs", "matching", "mapping", "depth", "moving", "fusion",
-/// "surface", "texture", "writing".
+/// "video", "frames", "features", "pairs", "matching", "mapping", "scale", "depth", "moving",
+/// "fusion", "surface", "texture", "writing".
 [[nodiscard]] std::string_view to_string(Stage stage);
 
 /// How far a stage is. `total` may be 0 while it is not known.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <system_error>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -100,17 +101,24 @@ std::vector<PairEvidence> evidence_of(const std::vector<PairRecord>& pairs) {
   return evidence;
 }
 
+/// The models as they are published, and what became of each photograph.
+struct FinishedModels {
+  std::span<const ImageOutcome> outcomes;
+  const ScaledModels& scaled;
+};
+
 ReconstructionReport report_on(const PhotoSet& photos,
                                const ReconstructionOptions& options,
                                const MemoryPlan& plan,
                                const CameraGroups& cameras,
                                const std::vector<PairRecord>& pairs,
-                               const MappedPhotos& mapped) {
+                               const FinishedModels& models) {
   const std::vector<PairEvidence> evidence = evidence_of(pairs);
   const std::vector<IntrinsicsOrigin> origins = origins_of(cameras);
   ReportInput input;
-  input.components = mapped.components;
-  input.images = mapped.outcomes;
+  input.components = models.scaled.components;
+  input.scale = models.scaled.scale;
+  input.images = models.outcomes;
   input.frames = photos.frames;
   input.pairs = evidence;
   input.intrinsics_origins = origins;
@@ -136,6 +144,7 @@ ReconstructionReport report_on_model(const PhotoSet& photos,
   input.images = history.images;
   input.frames = history.frames;
   input.pairs = history.pairs;
+  input.scale = history.scale;
   input.intrinsics_origins = history.intrinsics_origins;
   input.settings = history.settings;
   input.finish = history.finish;
@@ -169,6 +178,8 @@ std::string_view to_string(Stage stage) {
       return "matching";
     case Stage::kMap:
       return "mapping";
+    case Stage::kScale:
+      return "scale";
     case Stage::kDepth:
       return "depth";
     case Stage::kMoving:
@@ -188,7 +199,12 @@ std::string_view to_string(Stage stage) {
 Result<> ReconstructionOptions::validate() const {
   TM_RETURN_IF_ERROR(features.validate());
   TM_RETURN_IF_ERROR(mapper.validate());
+  TM_RETURN_IF_ERROR(scale.validate());
   TM_RETURN_IF_ERROR(build.validate());
+  if (poses && scale.known.any()) {
+    return fail(ErrorCode::kInvalidArgument,
+                "given poses keep their unit: known lengths cannot be used with them");
+  }
   if (num_threads < 1 || num_threads > kMaxThreads) {
     return fail(ErrorCode::kInvalidArgument,
                 "the number of threads is {}: it must be in [1, {}]",
@@ -294,6 +310,17 @@ Result<MappedPhotos> map_what_stood_still(const Run& run,
   return registered_count(again) >= registered_count(mapped) ? std::move(again) : std::move(mapped);
 }
 
+/// The models in metres, where known lengths allow it.
+Result<ScaledModels> scale_models(const Run& run,
+                                  std::vector<Scene> components,
+                                  const StageContext& context) {
+  auto models = find_metric_scale(run.photos, std::move(components), run.options.scale, context);
+  if (run.options.scale.known.any()) {
+    run.stopwatch.finish(Stage::kScale);
+  }
+  return models;
+}
+
 Result<ReconstructionSummary> run_stages(const Run& run) {
   const ReconstructionOptions& options = run.options;
   TM_ASSIGN_OR_RETURN(const MemoryPlan plan, plan_for(run.photos, options));
@@ -301,18 +328,19 @@ Result<ReconstructionSummary> run_stages(const Run& run) {
   const StageContext context{pool, run.checkpoints, run.listener, run.stop};
   TM_ASSIGN_OR_RETURN(const PhotoFeatures features, extract(run, plan));
   TM_ASSIGN_OR_RETURN(const auto pairs, match(run, features, context));
-  TM_ASSIGN_OR_RETURN(const MappedPhotos mapped,
-                      map_what_stood_still(run, features, pairs, context));
+  TM_ASSIGN_OR_RETURN(MappedPhotos mapped, map_what_stood_still(run, features, pairs, context));
   run.stopwatch.finish(Stage::kMap);
+  TM_ASSIGN_OR_RETURN(const ScaledModels models,
+                      scale_models(run, std::move(mapped.components), context));
 
   run.listener.on_progress({Stage::kWrite, 0, 1});
   ReconstructionSummary summary{
-      report_on(run.photos, options, plan, features.cameras, pairs, mapped), {}};
-  TM_RETURN_IF_ERROR(write_model(run.places.model, mapped.components, summary.report));
+      report_on(run.photos, options, plan, features.cameras, pairs, {mapped.outcomes, models}), {}};
+  TM_RETURN_IF_ERROR(write_model(run.places.model, models.components, summary.report));
   run.listener.on_progress({Stage::kWrite, 1, 1});
   run.stopwatch.finish(Stage::kWrite);
-  if (!mapped.components.empty()) {
-    TM_RETURN_IF_ERROR(build_surface({run.photos, mapped.components, run.places.model, options},
+  if (!models.components.empty()) {
+    TM_RETURN_IF_ERROR(build_surface({run.photos, models.components, run.places.model, options},
                                      context,
                                      run.stopwatch,
                                      summary.report));

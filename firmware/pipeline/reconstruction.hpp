@@ -17,6 +17,7 @@
 #include "firmware/pipeline/photo_set.hpp"
 #include "firmware/pipeline/progress.hpp"
 #include "firmware/pipeline/report.hpp"
+#include "firmware/pipeline/scale_stage.hpp"
 #include "firmware/pipeline/stopwatch.hpp"
 #include "firmware/pipeline/video_frames.hpp"
 #include "sfm/features/features.hpp"
@@ -35,6 +36,7 @@ struct ReconstructionOptions {
   std::vector<Camera> cameras;  ///< given intrinsics; empty when none are known
   std::optional<Scene> poses;   ///< given cameras and poses: nothing is solved but the points
   MapperOptions mapper;
+  ScaleOptions scale;  ///< known lengths for a model in metres; not together with `poses`
   BuildOptions build;  ///< what follows after mapping, and where it ends
   /// Threads that work, [1, 256]. The result does not depend on it.
   int num_threads = 1;

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 #include <numeric>
 #include <unordered_map>
 #include <utility>
 
 #include "firmware/base/check.hpp"
+#include "firmware/pipeline/report_scale.hpp"
 
 namespace trigmesh {
 namespace {
@@ -301,14 +303,6 @@ void decide_verdict(ReconstructionReport& report) {
   }
 }
 
-std::string units_sentence(std::optional<double> metres_per_unit) {
-  if (!metres_per_unit) {
-    return "Up to scale: lengths are in model units, because no metric reference was given. Ratios "
-           "and angles are valid.";
-  }
-  return fmt::format("Metric: one model unit is {:.6g} m.", *metres_per_unit);
-}
-
 void count_images(ReconstructionReport& report) {
   report.images_total = report.images.size();
   for (const ImageReport& image : report.images) {
@@ -364,8 +358,9 @@ ReconstructionReport build_report(const ReportInput& input) {
   ReconstructionReport report;
   report.software_version = input.software_version;
   report.input_description = input.input_description;
-  report.metres_per_unit = input.metres_per_unit;
-  report.units_sentence = units_sentence(input.metres_per_unit);
+  report.scale.assign(input.scale.begin(), input.scale.end());
+  report.metres_per_unit = is_metric(input.scale) ? std::optional(1.0) : std::nullopt;
+  report.units_sentence = units_sentence(input.scale);
   report.dense = input.dense;
   report.moving = input.moving;
   report.surface = input.surface;
@@ -388,6 +383,7 @@ ReconstructionReport build_report(const ReportInput& input) {
   report.frames.assign(input.frames.begin(), input.frames.end());
   report.settings = input.settings;
   report.notes = input.notes;
+  std::ranges::move(scale_notes(input.scale), std::back_inserter(report.notes));
   std::ranges::stable_sort(report.notes, [](const ReportNote& a, const ReportNote& b) {
     return a.severity > b.severity;
   });

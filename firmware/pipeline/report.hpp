@@ -84,9 +84,9 @@ struct ReportInput {
   std::vector<ReportSetting> settings;
   std::vector<ReportNote> notes;
   std::string software_version;
-  std::string input_description;          ///< e.g. "folder fountain, 11 photographs"
-  std::optional<double> metres_per_unit;  ///< > 0, when the scale is known
-  std::optional<DenseSection> dense;      ///< of the main component, like the next three
+  std::string input_description;        ///< e.g. "folder fountain, 11 photographs"
+  std::span<const ScaleSection> scale;  ///< per component; empty: nobody knew a length
+  std::optional<DenseSection> dense;    ///< of the main component, like the next four
   std::optional<MovingSection> moving;
   std::optional<SurfaceSection> surface;
   std::optional<TextureSection> texture;
@@ -139,7 +139,7 @@ struct ReconstructionReport {
   Verdict verdict = Verdict::kNotReady;
   std::string verdict_sentence;
   std::string units_sentence;
-  std::optional<double> metres_per_unit;
+  std::optional<double> metres_per_unit;  ///< 1 when the main component is in metres
   std::size_t images_total = 0;
   std::size_t images_registered = 0;  ///< with a pose in the main component
   std::size_t images_in_other_components = 0;
@@ -153,6 +153,7 @@ struct ReconstructionReport {
   Histogram reprojection_error_px;
   Histogram track_length;             ///< images per point
   Histogram triangulation_angle_deg;  ///< per point: the largest angle between two of its rays
+  std::vector<ScaleSection> scale;    ///< per component; empty: nobody knew a length
   std::optional<DenseSection> dense;
   std::optional<MovingSection> moving;
   std::optional<SurfaceSection> surface;

@@ -18,6 +18,7 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr std::size_t kMaxCameraGroups = 100'000;
+constexpr std::size_t kMaxMarkers = 1000;
 
 constexpr std::array kTwoViewKinds{
     TwoViewKind::kNone,
@@ -39,6 +40,18 @@ constexpr std::array kVerdicts{
     FrameVerdict::kOverBudget,
 };
 constexpr std::array kGapKinds{GapKind::kHole, GapKind::kWeak};
+constexpr std::array kScaleOutcomes{
+    ScaleOutcome::kOk,
+    ScaleOutcome::kNothingMeasured,
+    ScaleOutcome::kDisagreement,
+};
+constexpr std::array kSquareOutcomes{
+    SquareOutcome::kOk,
+    SquareOutcome::kTooFewViews,
+    SquareOutcome::kSmallAngle,
+    SquareOutcome::kInconsistent,
+};
+constexpr std::array kUpSources{UpSource::kNone, UpSource::kCard};
 constexpr std::array kOrigins{
     IntrinsicsOrigin::kGiven, IntrinsicsOrigin::kPriorRefined, IntrinsicsOrigin::kSolved};
 
@@ -77,6 +90,22 @@ Result<Enum> one_of(const Json& object, const char* name, std::span<const Enum> 
     return *value;
   }
   return bad_member(name, "has a value that is not known");
+}
+
+/// Calls `parse` for each element of the array `name`.
+template <typename Parse>
+Result<> for_each_in(const Json& document, const char* name, const Parse& parse) {
+  const auto array = document.find(name);
+  if (array == document.end() || !array->is_array()) {
+    return bad_member(name, "is no list");
+  }
+  for (const Json& element : *array) {
+    if (!element.is_object()) {
+      return bad_member(name, "has an element that is no object");
+    }
+    TM_RETURN_IF_ERROR(parse(element));
+  }
+  return {};
 }
 
 Result<ImageOutcome> parse_image(const Json& json) {
@@ -165,20 +194,51 @@ Result<FinishGap> parse_gap(const Json& json) {
   return gap;
 }
 
-/// Calls `parse` for each element of the array `name`.
-template <typename Parse>
-Result<> for_each_in(const Json& document, const char* name, const Parse& parse) {
-  const auto array = document.find(name);
-  if (array == document.end() || !array->is_array()) {
-    return bad_member(name, "is no list");
+Result<LengthEvidence> parse_length(const Json& json) {
+  LengthEvidence length;
+  TM_ASSIGN_OR_RETURN(length.name, text_of(json, "name"));
+  TM_ASSIGN_OR_RETURN(length.known_m, number_of(json, "known_m"));
+  TM_ASSIGN_OR_RETURN(length.metres_per_unit, number_of(json, "metres_per_unit"));
+  TM_ASSIGN_OR_RETURN(length.sd_ratio, number_of(json, "sd_ratio"));
+  TM_ASSIGN_OR_RETURN(length.edge_sd_ratio, number_of(json, "edge_sd_ratio"));
+  return length;
+}
+
+Result<MarkerSection> parse_marker(const Json& json) {
+  MarkerSection marker;
+  TM_ASSIGN_OR_RETURN(const std::size_t id, count_of(json, "id"));
+  if (id >= kMaxMarkers) {
+    return bad_member("id", "is too large");
   }
-  for (const Json& element : *array) {
-    if (!element.is_object()) {
-      return bad_member(name, "has an element that is no object");
-    }
-    TM_RETURN_IF_ERROR(parse(element));
-  }
-  return {};
+  marker.id = static_cast<int>(id);
+  TM_ASSIGN_OR_RETURN(marker.outcome, one_of<SquareOutcome>(json, "outcome", kSquareOutcomes));
+  TM_ASSIGN_OR_RETURN(marker.views_seen, count_of(json, "views_seen"));
+  TM_ASSIGN_OR_RETURN(marker.views_used, count_of(json, "views_used"));
+  TM_ASSIGN_OR_RETURN(marker.rms_px, number_of(json, "rms_px"));
+  return marker;
+}
+
+Result<ScaleSection> parse_scale(const Json& json) {
+  ScaleSection scale;
+  TM_ASSIGN_OR_RETURN(scale.outcome, one_of<ScaleOutcome>(json, "outcome", kScaleOutcomes));
+  TM_ASSIGN_OR_RETURN(scale.metres_per_unit, number_of(json, "metres_per_mapping_unit"));
+  TM_ASSIGN_OR_RETURN(scale.sd_ratio, number_of(json, "sd_ratio"));
+  TM_RETURN_IF_ERROR(for_each_in(json, "lengths", [&](const Json& element) -> Result<> {
+    TM_ASSIGN_OR_RETURN(LengthEvidence length, parse_length(element));
+    scale.lengths.push_back(std::move(length));
+    return {};
+  }));
+  TM_RETURN_IF_ERROR(for_each_in(json, "markers", [&](const Json& element) -> Result<> {
+    TM_ASSIGN_OR_RETURN(const MarkerSection marker, parse_marker(element));
+    scale.markers.push_back(marker);
+    return {};
+  }));
+  TM_ASSIGN_OR_RETURN(scale.problem, text_of(json, "problem"));
+  TM_ASSIGN_OR_RETURN(const UpSource up, one_of<UpSource>(json, "up", kUpSources));
+  scale.z_is_up = up == UpSource::kCard;
+  TM_ASSIGN_OR_RETURN(scale.up_sd_deg, number_of(json, "up_sd_deg"));
+  TM_ASSIGN_OR_RETURN(scale.up_problem, text_of(json, "up_problem"));
+  return scale;
 }
 
 Result<FinishSection> parse_finish(const Json& json) {
@@ -240,6 +300,13 @@ Result<ReportHistory> parse_report_history(std::string_view json) {
     history.pairs.push_back(pair);
     return {};
   }));
+  if (document.contains("scale")) {  // where somebody knew a length
+    TM_RETURN_IF_ERROR(for_each_in(document, "scale", [&](const Json& element) -> Result<> {
+      TM_ASSIGN_OR_RETURN(ScaleSection scale, parse_scale(element));
+      history.scale.push_back(std::move(scale));
+      return {};
+    }));
+  }
   TM_RETURN_IF_ERROR(for_each_in(document, "settings", [&](const Json& element) -> Result<> {
     TM_ASSIGN_OR_RETURN(ReportSetting setting, parse_setting(element));
     history.settings.push_back(std::move(setting));

@@ -16,6 +16,7 @@ struct ReportHistory {
   std::vector<VideoFrameSection> frames;             ///< of the video, if it was one
   std::vector<PairEvidence> pairs;                   ///< positions are < images.size()
   std::vector<IntrinsicsOrigin> intrinsics_origins;  ///< per camera group; kSolved where untold
+  std::vector<ScaleSection> scale;                   ///< per component; empty: nobody knew a length
   std::vector<ReportSetting> settings;
   std::optional<FinishSection> finish;  ///< of the surface, if there was one
   std::string input_description;

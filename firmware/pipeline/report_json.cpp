@@ -194,6 +194,28 @@ Json to_json(const MovingImage& image) {
   return {{"name", image.name}, {"masked_ratio", rounded(image.masked_ratio, kRatioDigits)}};
 }
 
+Json to_json(const LengthEvidence& length) {
+  return {
+      {"name", length.name},
+      {"known_m", length.known_m},
+      {"metres_per_unit", significant(length.metres_per_unit)},
+      {"sd_ratio", significant(length.sd_ratio)},
+      {"edge_sd_ratio", significant(length.edge_sd_ratio)},
+  };
+}
+
+Json to_json(const MarkerSection& marker) {
+  return {
+      {"id", marker.id},
+      {"outcome", to_string(marker.outcome)},
+      {"views_seen", marker.views_seen},
+      {"views_used", marker.views_used},
+      {"rms_px", rounded(marker.rms_px, kPixelDigits)},
+  };
+}
+
+Json to_json(const ScaleSection& scale);
+
 template <typename T>
 Json list(const std::vector<T>& values) {
   Json array = Json::array();
@@ -255,6 +277,22 @@ void add_section(Json& document, const char* name, const std::optional<T>& secti
   }
 }
 
+Json to_json(const ScaleSection& scale) {
+  const bool metric = scale.outcome == ScaleOutcome::kOk;
+  return {
+      {"unit", metric ? "metre" : "arbitrary"},
+      {"outcome", to_string(scale.outcome)},
+      {"metres_per_mapping_unit", significant(scale.metres_per_unit)},
+      {"sd_ratio", significant(scale.sd_ratio)},
+      {"lengths", list(scale.lengths)},
+      {"markers", list(scale.markers)},
+      {"problem", scale.problem},
+      {"up", scale.z_is_up ? "card" : "none"},
+      {"up_sd_deg", rounded(scale.up_sd_deg, kAngleDigits)},
+      {"up_problem", scale.up_problem},
+  };
+}
+
 Json summary(const ReconstructionReport& report) {
   Json totals = {
       {"images", report.images_total},
@@ -296,6 +334,9 @@ std::string render_report_json(const ReconstructionReport& report) {
        }},
       {"settings", list(report.settings)},
   };
+  if (!report.scale.empty()) {
+    document["scale"] = list(report.scale);
+  }
   add_section(document, "dense", report.dense);
   add_section(document, "moving", report.moving);
   add_section(document, "surface", report.surface);

@@ -9,6 +9,7 @@
 
 #include "sfm/coverage/gap_kind.hpp"
 #include "sfm/keyframes/frame_verdict.hpp"
+#include "sfm/scale/metric_scale.hpp"
 
 namespace trigmesh {
 
@@ -30,6 +31,28 @@ struct VideoFrameSection {
   FrameVerdict verdict = FrameVerdict::kKept;
   FrameMeasures measures{};
   std::optional<LiveMapping> live{};  ///< kept ones of a capture that was mapped while it went on
+};
+
+/// A marker as the views of a model see it.
+struct MarkerSection {
+  int id = 0;
+  SquareOutcome outcome = SquareOutcome::kOk;
+  std::size_t views_seen = 0;
+  std::size_t views_used = 0;
+  double rms_px = 0.0;  ///< of its corners; kOk only
+};
+
+/// What fixed the unit of a model, where somebody knew a length.
+struct ScaleSection {
+  ScaleOutcome outcome = ScaleOutcome::kNothingMeasured;  ///< kOk: lengths of the model are metres
+  double metres_per_unit = 0.0;  ///< of the unit that mapping had chosen; kOk only, as the next
+  double sd_ratio = 0.0;         ///< standard deviation of the scale, as a part of it
+  std::vector<LengthEvidence> lengths{};  ///< in the unit that mapping had chosen
+  std::vector<MarkerSection> markers{};   ///< of which a length is known, by number
+  std::string problem{};                  ///< why there is no scale, one sentence; else empty
+  bool z_is_up = false;                   ///< origin and axes are those of the card, z up
+  double up_sd_deg = 0.0;                 ///< standard deviation of up about one axis
+  std::string up_problem{};               ///< why there is no up although it was asked for
 };
 
 /// Depth maps and the cloud that was made of them.

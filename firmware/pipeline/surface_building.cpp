@@ -281,6 +281,16 @@ TextureSection sum_up(const TextureReport& made) {
   return section;
 }
 
+/// How files for viewers are turned and scaled, by what the report tells of the world.
+ModelPlacement placement_of(const ReconstructionReport& report) {
+  ModelPlacement placement;
+  placement.metres_per_unit = report.metres_per_unit;
+  if (!report.scale.empty() && report.scale.front().z_is_up) {
+    placement.model_from_world = y_up_from_z_up();
+  }
+  return placement;
+}
+
 Result<> add_texture(Work& work, const TriangleMesh& mesh) {
   TM_RETURN_IF_ERROR(check_not_stopped(work.context, "the texture"));
   work.context.listener.on_progress({Stage::kTexture, 0, 1});
@@ -291,9 +301,12 @@ Result<> add_texture(Work& work, const TriangleMesh& mesh) {
   work.report.texture = sum_up(made.report);
   warn(work.report, made.report.lowered_quality);
   work.context.executor.stop_point();
-  TM_ASSIGN_OR_RETURN(std::vector<NamedFile> files, write_obj(made.textured));
+  ObjOptions obj;
+  obj.placement = placement_of(work.report);
+  TM_ASSIGN_OR_RETURN(std::vector<NamedFile> files, write_obj(made.textured, obj));
   work.context.executor.stop_point();
   GlbOptions glb;
+  glb.placement = obj.placement;
   glb.generator = fmt::format("trigmesh {}", work.input.options.software_version);
   TM_ASSIGN_OR_RETURN(work.glb, write_glb(made.textured, glb));
   files.push_back({"textured.glb", work.glb});

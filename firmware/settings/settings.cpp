@@ -1,6 +1,8 @@
 #include "firmware/settings/settings.hpp"
 
 #include <algorithm>
+#include <array>
+#include <charconv>
 #include <cmath>
 #include <exception>
 #include <map>
@@ -41,6 +43,34 @@ std::string nearest(std::string_view name, const std::vector<std::string>& known
   return *std::min_element(known.begin(), known.end(), [&](const auto& a, const auto& b) {
     return edit_distance(compared, a) < edit_distance(compared, b);
   });
+}
+
+constexpr int kMaxMarker = 999;  ///< of the largest dictionary
+
+/// The number of a marker as the key of a table.
+bool parse_key(std::string_view text, int& marker) {
+  const char* const end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, marker);
+  return error == std::errc{} && stop == end && marker >= 0 && marker <= kMaxMarker;
+}
+
+/// Two markers, "0-1", put into ascending order.
+bool parse_key(std::string_view text, std::pair<int, int>& markers) {
+  const std::size_t dash = text.find('-');
+  if (dash == std::string_view::npos || !parse_key(text.substr(0, dash), markers.first) ||
+      !parse_key(text.substr(dash + 1), markers.second)) {
+    return false;
+  }
+  markers = std::minmax({markers.first, markers.second});
+  return markers.first != markers.second;
+}
+
+constexpr std::string_view key_form(int /*of*/) {
+  return "the number of a marker";
+}
+
+constexpr std::string_view key_form(const std::pair<int, int>& /*of*/) {
+  return "the numbers of two markers with a dash between them";
 }
 
 /// All that is wrong with a file, by line.
@@ -153,6 +183,33 @@ class Reader {
     value = *found;
   }
 
+  template <typename Key>
+  void table(const KeyText& key, std::map<Key, double>& value, Range<double> range) {
+    const toml::node* node = find(key);
+    if (node == nullptr) {
+      return;
+    }
+    const toml::table* entries = node->as_table();
+    if (entries == nullptr) {
+      complain(key, *node, fmt::format("must be a table of {} = number", key_form(Key{})));
+      return;
+    }
+    for (const auto& [name, entry] : *entries) {
+      const std::string path = fmt::format("{}.{}", key.name, name.str());
+      const auto number = entry.is_number() ? entry.template value<double>() : std::nullopt;
+      Key place{};
+      if (!parse_key(name.str(), place)) {
+        complain({path, key.unit, {}}, entry, fmt::format("the key must be {}", key_form(place)));
+      } else if (!number || !(*number >= range.min && *number <= range.max)) {
+        complain({path, key.unit, {}},
+                 entry,
+                 fmt::format("must be a number in [{}, {}]", range.min, range.max));
+      } else if (!value.emplace(place, *number).second) {
+        complain({path, key.unit, {}}, entry, "is there already under another name");
+      }
+    }
+  }
+
   /// Complains about every key that was not asked for.
   void refuse_unknown() {
     std::vector<std::string> sections;
@@ -215,6 +272,21 @@ class Reader {
   std::map<std::string, std::vector<std::string>, std::less<>> known_;
 };
 
+/// How many markers a dictionary has.
+int marker_count(ScaleSettings::Dictionary dictionary) {
+  constexpr std::array kCounts{50, 100, 250, 1000};
+  return kCounts.at(static_cast<std::size_t>(dictionary) % kCounts.size());
+}
+
+/// The largest number of a marker in either table; -1 when both are empty.
+int largest_marker(const ScaleSettings& scale) {
+  int largest = scale.marker_sides_m.empty() ? -1 : scale.marker_sides_m.rbegin()->first;
+  for (const auto& [markers, metres] : scale.marker_distances_m) {
+    largest = std::max(largest, markers.second);
+  }
+  return largest;
+}
+
 /// Values that are right alone and wrong together. `root` has at least one of the two.
 void check_together(const toml::table& root, const Settings& settings, Complaints& complaints) {
   const auto complain =
@@ -235,6 +307,17 @@ void check_together(const toml::table& root, const Settings& settings, Complaint
   if (settings.indicator.light_line >= 0 &&
       settings.indicator.light_line == settings.indicator.buzzer_line) {
     complain("indicator", "buzzer_line", "light_line", "is the line of the light already");
+  }
+  const ScaleSettings& scale = settings.scale;
+  if (largest_marker(scale) >= marker_count(scale.dictionary)) {
+    complain("scale",
+             scale.marker_sides_m.empty() ? "marker_distances_m" : "marker_sides_m",
+             "marker_distances_m",
+             "a marker is not in the dictionary: numbers begin at 0 and end below its last number");
+  }
+  if (scale.up == ScaleSettings::Up::kCard && scale.marker_side_m == 0.0 &&
+      scale.marker_sides_m.empty() && scale.marker_distances_m.empty()) {
+    complain("scale", "up", "up", "card needs a side or a distance of markers");
   }
   if (settings.storage.root.empty() || settings.storage.root.front() != '/') {
     complain("storage", "root", "root", "must be a path that begins with /");

@@ -3,8 +3,10 @@
 #include <chrono>
 #include <cstddef>
 #include <filesystem>
+#include <map>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "firmware/base/result.hpp"
 
@@ -107,6 +109,32 @@ struct ReconstructionSettings {
   bool operator==(const ReconstructionSettings&) const = default;
 };
 
+struct ScaleSettings {
+  enum class Dictionary {
+    kBits4Of50,
+    kBits4Of100,
+    kBits4Of250,
+    kBits4Of1000,
+    kBits5Of50,
+    kBits5Of100,
+    kBits5Of250,
+    kBits5Of1000,
+    kBits6Of50,
+    kBits6Of100,
+    kBits6Of250,
+    kBits6Of1000,
+  };
+  enum class Up { kNone, kCard };
+
+  Dictionary dictionary = Dictionary::kBits4Of50;
+  double marker_side_m = 0.0;
+  std::map<int, double> marker_sides_m;                      ///< by number
+  std::map<std::pair<int, int>, double> marker_distances_m;  ///< the smaller number first
+  Up up = Up::kNone;
+
+  bool operator==(const ScaleSettings&) const = default;
+};
+
 struct LogSettings {
   enum class Level { kError, kWarn, kInfo, kDebug };
 
@@ -123,6 +151,7 @@ struct Settings {
   CaptureSettings capture;
   StorageSettings storage;
   ReconstructionSettings reconstruction;
+  ScaleSettings scale;
   LogSettings log;
 
   bool operator==(const Settings&) const = default;

@@ -185,6 +185,42 @@ void visit_reconstruction(ReconstructionSettings& s, Visitor& v) {
 }
 
 template <typename Visitor>
+void visit_scale(ScaleSettings& s, Visitor& v) {
+  v.section("scale", "Markers of known size beside the thing, for models in metres.");
+  v.choice({"dictionary", "", "The ArUco dictionary that the markers are of"},
+           s.dictionary,
+           Choices<12>{"4x4_50",
+                       "4x4_100",
+                       "4x4_250",
+                       "4x4_1000",
+                       "5x5_50",
+                       "5x5_100",
+                       "5x5_250",
+                       "5x5_1000",
+                       "6x6_50",
+                       "6x6_100",
+                       "6x6_250",
+                       "6x6_1000"});
+  v.number({"marker_side_m",
+            "m",
+            "Side of the black square of every marker that is not named below, as measured on the "
+            "print; 0: only those below count"},
+           s.marker_side_m,
+           {0.0, 2.0});
+  v.table({"marker_sides_m", "m", "Sides of single markers, by number, as in { 3 = 0.12 }"},
+          s.marker_sides_m,
+          {0.001, 2.0});
+  v.table({"marker_distances_m",
+           "m",
+           "Known distances between the middles of two markers, as in { 0-1 = 0.5 }"},
+          s.marker_distances_m,
+          {0.001, 100.0});
+  v.choice({"up", "", "card: the markers lie flat, up is where they look; none: up is not known"},
+           s.up,
+           Choices<2>{"none", "card"});
+}
+
+template <typename Visitor>
 void visit_log(LogSettings& s, Visitor& v) {
   v.section("log", "What is told to the journal of the system.");
   v.choice({"level", "", "From which importance on"},
@@ -196,7 +232,7 @@ void visit_log(LogSettings& s, Visitor& v) {
 }
 
 /// Shows a visitor every section and key in the order of the file. It has the functions section,
-/// choice, text, whole, number, time and truth.
+/// choice, text, whole, number, time, truth and table.
 template <typename Visitor>
 void visit_settings(Settings& settings, Visitor& visitor) {
   visit_camera(settings.camera, visitor);
@@ -205,6 +241,7 @@ void visit_settings(Settings& settings, Visitor& visitor) {
   visit_capture(settings.capture, visitor);
   visit_storage(settings.storage, visitor);
   visit_reconstruction(settings.reconstruction, visitor);
+  visit_scale(settings.scale, visitor);
   visit_log(settings.log, visitor);
 }
 

@@ -1,10 +1,12 @@
 #include <cstddef>
+#include <map>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "firmware/settings/settings.hpp"
 #include "firmware/settings/settings_description.hpp"
@@ -35,6 +37,24 @@ std::string exact(double value) {
   return text.find_first_of(".e") == std::string::npos ? text + ".0" : text;
 }
 
+std::string key_text(int marker) {
+  return fmt::format("{}", marker);
+}
+
+std::string key_text(const std::pair<int, int>& markers) {
+  return fmt::format("{}-{}", markers.first, markers.second);
+}
+
+/// A table of numbers on one line.
+template <typename Key>
+std::string table_text(const std::map<Key, double>& values) {
+  std::vector<std::string> entries;
+  for (const auto& [key, value] : values) {
+    entries.push_back(fmt::format("{} = {}", key_text(key), exact(value)));
+  }
+  return entries.empty() ? "{}" : fmt::format("{{ {} }}", fmt::join(entries, ", "));
+}
+
 std::string_view truth_text(bool value) {
   return value ? "true" : "false";
 }
@@ -63,6 +83,11 @@ class ValueTexts {
   void number(const KeyText& /*key*/, double value, Range<double> /*range*/) { add(exact(value)); }
 
   void truth(const KeyText& /*key*/, bool value) { add(std::string(truth_text(value))); }
+
+  template <typename Key>
+  void table(const KeyText& /*key*/, const std::map<Key, double>& value, Range<double> /*range*/) {
+    add(table_text(value));
+  }
 
   /// The values as TOML, in the order of the file.
   [[nodiscard]] const std::vector<std::string>& values() const { return values_; }
@@ -104,6 +129,11 @@ class Writer {
   }
 
   void truth(const KeyText& key, bool& /*value*/) { add(key, "true, false"); }
+
+  template <typename Key>
+  void table(const KeyText& key, std::map<Key, double>& /*value*/, Range<double> range) {
+    add(key, fmt::format("a table, values in [{}, {}]", exact(range.min), exact(range.max)));
+  }
 
   [[nodiscard]] const std::string& text() const { return text_; }
 

@@ -12,6 +12,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "firmware/base/check.hpp"
+#include "sfm/calibration/edge_shift.hpp"
 
 namespace trigmesh {
 namespace {
@@ -159,12 +160,18 @@ double area(const Quad& quad) {
   return 0.5 * std::abs(cross(quad[2] - quad[0], quad[3] - quad[1]));
 }
 
+/// A marker that was found, and how.
+struct FoundMarker {
+  ReadMarker read;
+  MarkerIdentity identity;
+};
+
 /// The marker in a quadrilateral, corners refined where their edges are clear.
-std::optional<MarkerDetection> identify_quad(const cv::Mat& grey,
-                                             const cv::Mat& light,
-                                             const Quad& coarse,
-                                             const MarkerDictionary& dictionary,
-                                             double min_contrast) {
+std::optional<FoundMarker> identify_quad(const cv::Mat& grey,
+                                         const cv::Mat& light,
+                                         const Quad& coarse,
+                                         const MarkerDictionary& dictionary,
+                                         double min_contrast) {
   const Quad quad = refine_dark_quad(light, coarse).value_or(coarse);
   const auto pattern = read_bits(grey, quad, dictionary.bits, min_contrast);
   if (!pattern) {
@@ -174,21 +181,33 @@ std::optional<MarkerDetection> identify_quad(const cv::Mat& grey,
   if (!identity) {
     return std::nullopt;
   }
+  return FoundMarker{{quad, *pattern, dictionary.bits}, *identity};
+}
+
+MarkerDetection detection_of(const FoundMarker& found, double edge_shift_px) {
+  const Quad quad = moved_outwards(found.read.quad, edge_shift_px);
   MarkerDetection detection{
-      .id = identity->id, .corners_px = {}, .wrong_bits = identity->wrong_bits};
+      .id = found.identity.id, .corners_px = {}, .wrong_bits = found.identity.wrong_bits};
   for (std::size_t i = 0; i < 4; ++i) {
     // Turned clockwise by n quarters, the marker's top left corner is seen as corner n of the
     // clockwise four.
-    detection.corners_px[i] = quad[(i + static_cast<std::size_t>(identity->quarter_turns)) % 4];
+    detection.corners_px[i] =
+        quad[(i + static_cast<std::size_t>(found.identity.quarter_turns)) % 4];
   }
   return detection;
+}
+
+/// Of two finds of one marker, whether the second is better: fewer wrong bits, or larger.
+bool is_better(const FoundMarker& known, const FoundMarker& found) {
+  return found.identity.wrong_bits < known.identity.wrong_bits ||
+         area(found.read.quad) > 1.05 * area(known.read.quad);
 }
 
 std::vector<MarkerDetection> find_markers(const cv::Mat& grey,
                                           const MarkerDictionary& dictionary,
                                           const MarkerDetectorOptions& options) {
   const cv::Mat light = linear_light(grey, options.tone_curve);
-  std::map<int, MarkerDetection> by_id;
+  std::map<int, FoundMarker> by_id;
   for (const int side : window_sides(grey)) {
     cv::Mat dark;
     cv::adaptiveThreshold(
@@ -204,20 +223,22 @@ std::vector<MarkerDetection> find_markers(const cv::Mat& grey,
       if (!found) {
         continue;
       }
-      const auto known = by_id.find(found->id);
       // The same marker found through another window is the same; of two different ones the larger
       // is kept.
-      if (known == by_id.end()) {
-        by_id.emplace(found->id, *found);
-      } else if (found->wrong_bits < known->second.wrong_bits ||
-                 area(found->corners_px) > 1.05 * area(known->second.corners_px)) {
+      const auto [known, is_new] = by_id.emplace(found->identity.id, *found);
+      if (!is_new && is_better(known->second, *found)) {
         known->second = *found;
       }
     }
   }
+  std::vector<ReadMarker> read;
+  for (const auto& [id, found] : by_id) {
+    read.push_back(found.read);
+  }
+  const double shift_px = edge_shift_px(light, read).value_or(0.0);
   std::vector<MarkerDetection> detections;
-  for (const auto& [id, detection] : by_id) {
-    detections.push_back(detection);
+  for (const auto& [id, found] : by_id) {
+    detections.push_back(detection_of(found, shift_px));
   }
   return detections;
 }

@@ -39,37 +39,6 @@ struct Line {
   double offset = 0.0;
 };
 
-/// Distance along `outward` from `start` to the centre of the dark-to-light rise; nothing when
-/// there is no clear one.
-std::optional<double> edge_offset(const cv::Mat& light,
-                                  const Eigen::Vector2d& start,
-                                  const Eigen::Vector2d& outward) {
-  constexpr int kCount = static_cast<int>(2.0 * kSearchHalfLength_px / kProfileStep_px) + 1;
-  std::array<double, kCount> rise{};
-  int steepest = 0;
-  for (int k = 0; k < kCount; ++k) {
-    const double t = -kSearchHalfLength_px + kProfileStep_px * k;
-    rise[static_cast<std::size_t>(k)] = sample<float>(light, start + (t + 0.5) * outward) -
-                                        sample<float>(light, start + (t - 0.5) * outward);
-    if (rise[static_cast<std::size_t>(k)] > rise[static_cast<std::size_t>(steepest)]) {
-      steepest = k;
-    }
-  }
-  if (rise[static_cast<std::size_t>(steepest)] < kMinRise || steepest == 0 ||
-      steepest == kCount - 1) {
-    return std::nullopt;
-  }
-  // Centroid of the rise around its peak: unbiased for a blurred straight edge.
-  double weight_sum = 0.0;
-  double moment = 0.0;
-  for (int k = std::max(0, steepest - 3); k <= std::min(kCount - 1, steepest + 3); ++k) {
-    const double weight = std::max(0.0, rise[static_cast<std::size_t>(k)]);
-    weight_sum += weight;
-    moment += weight * (-kSearchHalfLength_px + kProfileStep_px * k);
-  }
-  return moment / weight_sum;
-}
-
 /// Total least squares line.
 Line fit_line(const std::vector<Eigen::Vector2d>& points) {
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
@@ -98,7 +67,7 @@ std::optional<Line> side_line(const cv::Mat& light,
   for (int i = 0; i < count; ++i) {
     const double t = kEndMargin_ratio + (1.0 - 2.0 * kEndMargin_ratio) * i / (count - 1);
     const Eigen::Vector2d start = from + t * along;
-    if (const auto offset = edge_offset(light, start, outward)) {
+    if (const auto offset = edge_offset(light, start, outward, kSearchHalfLength_px)) {
       points.emplace_back(start + *offset * outward);
     }
   }
@@ -138,6 +107,36 @@ std::optional<Eigen::Vector2d> intersection(const Line& a, const Line& b) {
 }
 
 }  // namespace
+
+std::optional<double> edge_offset(const cv::Mat& light,
+                                  const Eigen::Vector2d& start,
+                                  const Eigen::Vector2d& outward,
+                                  double half_length_px) {
+  const int count = static_cast<int>(2.0 * half_length_px / kProfileStep_px) + 1;
+  std::vector<double> rise(static_cast<std::size_t>(count));
+  int steepest = 0;
+  for (int k = 0; k < count; ++k) {
+    const double t = -half_length_px + kProfileStep_px * k;
+    rise[static_cast<std::size_t>(k)] = sample<float>(light, start + (t + 0.5) * outward) -
+                                        sample<float>(light, start + (t - 0.5) * outward);
+    if (rise[static_cast<std::size_t>(k)] > rise[static_cast<std::size_t>(steepest)]) {
+      steepest = k;
+    }
+  }
+  if (rise[static_cast<std::size_t>(steepest)] < kMinRise || steepest == 0 ||
+      steepest == count - 1) {
+    return std::nullopt;
+  }
+  // Centroid of the rise around its peak: unbiased for a blurred straight edge.
+  double weight_sum = 0.0;
+  double moment = 0.0;
+  for (int k = std::max(0, steepest - 3); k <= std::min(count - 1, steepest + 3); ++k) {
+    const double weight = std::max(0.0, rise[static_cast<std::size_t>(k)]);
+    weight_sum += weight;
+    moment += weight * (-half_length_px + kProfileStep_px * k);
+  }
+  return moment / weight_sum;
+}
 
 double sample_bilinear(const cv::Mat& image, const Eigen::Vector2d& pixel) {
   return image.type() == CV_8UC1 ? sample<std::uint8_t>(image, pixel) : sample<float>(image, pixel);

@@ -24,6 +24,13 @@ enum class ToneCurve {
 /// sRGB values its steepest place lies about a quarter of a pixel on the dark side.
 [[nodiscard]] cv::Mat linear_light(const cv::Mat& grey, ToneCurve curve);
 
+/// Distance along `outward` (unit, from dark to light) from `start` to the centre of the steepest
+/// rise within `half_length_px`, pixels; nothing when there is no clear one. `light` as below.
+[[nodiscard]] std::optional<double> edge_offset(const cv::Mat& light,
+                                                const Eigen::Vector2d& start,
+                                                const Eigen::Vector2d& outward,
+                                                double half_length_px);
+
 /// Moves the corners of a dark quadrilateral on a light background (clockwise as seen, roughly
 /// right to about two pixels) to the meeting points of straight lines through its sides: along each
 /// side the place of the steepest rise across it is measured to a fraction of a pixel, and a line

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -25,6 +26,12 @@ namespace trigmesh {
 /// with y down; viewers look along -z with Y up.
 [[nodiscard]] inline Rigid3 y_up_from_world() {
   return {.rotation = Eigen::Quaterniond(0.0, 1.0, 0.0, 0.0)};
+}
+
+/// A quarter turn about x: (x, y, z) becomes (x, z, -y), for a world whose z is up.
+[[nodiscard]] inline Rigid3 y_up_from_z_up() {
+  constexpr double kHalfAngle = std::numbers::sqrt2 / 2.0;
+  return {.rotation = Eigen::Quaterniond(kHalfAngle, -kHalfAngle, 0.0, 0.0)};
 }
 
 /// From the world of the reconstruction to the model in the file (right-handed, Y up):

@@ -28,7 +28,7 @@ ModelWorkerOptions options_with(int threads) {
   settings.preset = ReconstructionSettings::Preset::kPreview;
   settings.threads = threads;
   settings.seed = 3;
-  return model_worker_options(settings, TRIGMESH_VERSION);
+  return model_worker_options(settings, ScaleSettings{}, TRIGMESH_VERSION);
 }
 
 /// Makes the model of a session. The process ends like in a power cut when `killed_at` begins.

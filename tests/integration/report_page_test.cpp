@@ -210,8 +210,19 @@ TEST_F(ReportPage, ShowsSurfaceAndDepthMaps) {
   EXPECT_EQ(count_of(visit.dom, "src=\"data:image/jpeg;base64,"),
             std::size_t{3 * test_support::kSampleDepthPictures});
   EXPECT_THAT(visit.dom, HasSubstr("27.4 dB"));
-  EXPECT_THAT(visit.dom, HasSubstr("2.01 m\xC2\xB2"));
+  EXPECT_THAT(visit.dom, HasSubstr("12.5 m\xC2\xB2"));
   EXPECT_THAT(visit.dom, HasSubstr("Depth maps at half the size of the photographs"));
+}
+
+TEST_F(ReportPage, ShowsWhatTheScaleComesFrom) {
+  const Visit visit = open(test_support::sample_report_page(), "");
+  expect_sound(visit);
+  EXPECT_THAT(visit.dom,
+              HasSubstr("Lengths are in metres, from 2 known lengths, to 0.13 % (one standard "
+                        "deviation). Up is off the card, to 0.12\xC2\xB0."));
+  EXPECT_THAT(visit.dom, HasSubstr("markers 0 and 1"));
+  EXPECT_THAT(visit.dom, HasSubstr("0.50050 m"));  // 0.5 m * 0.4 / 0.3996
+  EXPECT_THAT(visit.dom, HasSubstr("13 / 14"));
 }
 
 TEST_F(ReportPage, ShowsHostileNamesAsText) {

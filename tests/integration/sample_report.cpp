@@ -133,7 +133,16 @@ Scene sample_scene(const TexturedMesh& globe) {
 }
 
 void add_sections(ReportInput& input) {
-  input.metres_per_unit = 0.4;
+  static const std::vector<ScaleSection> kScale{
+      {.outcome = ScaleOutcome::kOk,
+       .metres_per_unit = 0.4,
+       .sd_ratio = 0.0013,
+       .lengths = {{"marker 0", 0.1, 0.4, 0.001, 0.0005},
+                   {"markers 0 and 1", 0.5, 0.3996, 0.002, 0.0}},
+       .markers = {{0, SquareOutcome::kOk, 14, 13, 0.21}, {1, SquareOutcome::kOk, 9, 9, 0.18}},
+       .z_is_up = true,
+       .up_sd_deg = 0.12}};
+  input.scale = kScale;
   input.dense = DenseSection{.views = 14,
                              .map_width_px = 480,
                              .map_height_px = 360,

@@ -22,6 +22,7 @@
 #include "sfm/exchange/file_io.hpp"
 #include "sfm/exchange/image_codec.hpp"
 #include "tools/trigmesh/command.hpp"
+#include "tools/trigmesh/lengths.hpp"
 
 namespace trigmesh {
 namespace {
@@ -60,25 +61,6 @@ struct Photograph {
   BoardDetection detection;
 };
 
-/// "25mm", "2.5cm", "0.025m": the unit is required, because a bare 25 is as often meant as
-/// millimetres as as metres.
-Result<double> parse_length_m(std::string_view option, const std::string& text) {
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  const std::string_view unit(end, static_cast<std::size_t>(text.data() + text.size() - end));
-  constexpr std::array<std::pair<std::string_view, double>, 3> kUnits{
-      {{"mm", 1e-3}, {"cm", 1e-2}, {"m", 1.0}}};
-  const auto* known = std::find_if(
-      kUnits.begin(), kUnits.end(), [&](const auto& candidate) { return candidate.first == unit; });
-  if (error != std::errc{} || known == kUnits.end() || !(value > 0.0)) {
-    return fail(ErrorCode::kInvalidArgument,
-                "{} is '{}', must be a length with its unit, as 25mm, 2.5cm or 0.025m",
-                option,
-                text);
-  }
-  return value * known->second;
-}
-
 /// Columns and rows of the board from "9x6".
 Result<> parse_board_size(const std::string& text, Board& board) {
   const char* end = text.data() + text.size();
@@ -98,12 +80,15 @@ Result<Board> parse_board(const CalibrateOptions& options) {
     board.kind = BoardKind::kCharuco;
   }
   TM_RETURN_IF_ERROR(parse_board_size(options.board, board));
-  TM_ASSIGN_OR_RETURN(board.square_m, parse_length_m("--square", options.square));
+  // A bare 25 is as often meant as millimetres as as metres.
+  TM_ASSIGN_OR_RETURN(board.square_m,
+                      parse_length_m("--square", options.square, BareNumber::kRefused));
   if (board.kind == BoardKind::kCharuco) {
     if (options.marker_size.empty()) {
       return fail(ErrorCode::kInvalidArgument, "--target charuco needs --marker-size");
     }
-    TM_ASSIGN_OR_RETURN(board.marker_m, parse_length_m("--marker-size", options.marker_size));
+    TM_ASSIGN_OR_RETURN(board.marker_m,
+                        parse_length_m("--marker-size", options.marker_size, BareNumber::kRefused));
     const auto dictionary = marker_dictionary_from_string(options.dictionary);
     if (!dictionary) {
       return fail(

@@ -13,6 +13,7 @@
 #include "sfm/exchange/model_folder.hpp"
 #include "tools/trigmesh/command.hpp"
 #include "tools/trigmesh/reconstruct_run.hpp"
+#include "tools/trigmesh/scale_arguments.hpp"
 #include "tools/trigmesh/surface_arguments.hpp"
 
 namespace trigmesh {
@@ -25,6 +26,7 @@ constexpr const char* kFooter = R"(Examples:
   trigmesh reconstruct recording --output model --match sequential --threads 2
   trigmesh reconstruct clip.mp4 --output model
   trigmesh reconstruct photos --output model --preset preview
+  trigmesh reconstruct photos --output model --marker-side 100mm --up card
   trigmesh reconstruct list.txt --output model --stop-after sparse --memory-limit 500M
 
 INPUT is a folder of JPEG or PNG photographs, a text file with one path a line, a recording (a folder with images/ and,
@@ -32,7 +34,10 @@ if there is one, timestamps.csv), or a video file, whose frames the program ffmp
 OUTPUT/frames. Of a video or recording with 10 frames a second or more only keyframes are used: the sharpest frame of
 each stretch with enough motion; the report says of each frame why. The result is OUTPUT/model:
 sparse/ (COLMAP text), projections.txt, sparse.ply, dense.ply, masks/ (where something moved), mesh.ply, textured.glb,
-textured.obj, report.json and report.html. When interrupted, the same command goes on where it stopped.
+textured.obj, report.json and report.html.
+With --marker-side or --known-distance lengths are metres when ArUco markers in the scene are seen well enough and
+agree; else everything is made in a unit of its own, and the exit code is 4. When interrupted, the same command goes on
+where it stopped.
 )";
 
 /// The options as they come from the command line.
@@ -50,6 +55,7 @@ struct ReconstructArguments {
   bool upright = false;
   bool no_upsample = false;
   bool no_masks = false;
+  ScaleArguments scale;
   SurfaceArguments surface;
 };
 
@@ -68,6 +74,7 @@ Result<ReconstructionOptions> options_from(const ReconstructArguments& arguments
   options.seed = arguments.surface.seed;
   options.build =
       build_options_from(arguments.surface, *last_stage_from_string(arguments.stop_after));
+  TM_ASSIGN_OR_RETURN(options.scale, scale_options_from(arguments.scale));
   options.software_version = TRIGMESH_VERSION;
   if (!arguments.camera_file.empty()) {
     TM_ASSIGN_OR_RETURN(const std::vector<CameraProfile> profiles,
@@ -167,6 +174,7 @@ void add_reconstruct_command(CLI::App& app, CommandContext& context) {
   command->add_option("--stop-after", arguments->stop_after, "Last stage")
       ->check(CLI::IsMember({"sparse", "dense", "mesh", "texture"}))
       ->capture_default_str();
+  add_scale_options(*command, arguments->scale);
   add_surface_options(*command, arguments->surface);
   command->footer(kFooter);
   command->callback([arguments, &context] { finish_command(context, run(*arguments)); });

@@ -14,6 +14,9 @@ namespace {
 
 void print_summary(const ReconstructionReport& report, const std::string& output) {
   fmt::print("{}\n", report.verdict_sentence);
+  if (!report.scale.empty()) {
+    fmt::print("{}\n", report.units_sentence);
+  }
   for (const ImageReport& image : report.images) {
     if (image.reason != RefusalReason::kNone) {
       fmt::print("  refused {}: {} - {}\n", image.name, to_string(image.reason), image.detail);
@@ -37,6 +40,17 @@ void print_summary(const ReconstructionReport& report, const std::string& output
       output);
 }
 
+/// Who gave a length wants metres.
+Result<> check_scale(const ReconstructionReport& report, const std::string& output) {
+  if (report.scale.empty() || report.metres_per_unit) {
+    return {};
+  }
+  return fail(ErrorCode::kInsufficientData,
+              "the model in {}/model has no scale, its lengths are in a unit of their own: {}",
+              output,
+              report.scale.front().problem);
+}
+
 }  // namespace
 
 Result<> run_reconstruction(const ReconstructRun& run) {
@@ -58,7 +72,7 @@ Result<> run_reconstruction(const ReconstructRun& run) {
                 run.input,
                 run.output);
   }
-  return {};
+  return check_scale(summary->report, run.output);
 }
 
 }  // namespace trigmesh

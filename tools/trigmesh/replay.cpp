@@ -83,7 +83,7 @@ Result<std::unique_ptr<ReplayInput>> open_input(const ReplayArguments& arguments
     input->options = *std::move(options);
     input->photos = input->recorded;
   } else if (options.error().code == ErrorCode::kNotFound) {
-    input->options = model_options({}, TRIGMESH_VERSION);
+    input->options = model_options({}, {}, TRIGMESH_VERSION);
     if (input->recorded.timestamps.empty()) {
       return fail(ErrorCode::kInvalidArgument,
                   "cannot replay {}: it is neither a session of the rig (session.json) nor a "

@@ -6,6 +6,7 @@ import { buildFinish } from './finish.js';
 import { buildHistogram } from './histogram.js';
 import { buildImageTable } from './image_table.js';
 import { buildMatchMatrix } from './match_matrix.js';
+import { buildScale } from './scale.js';
 import { buildCameras, buildCards, buildHeader, buildNotes, buildSettings } from './summary.js';
 import { buildDepthMaps, buildSurface } from './surface.js';
 import { buildTimeline } from './timeline.js';
@@ -62,6 +63,7 @@ function build() {
       buildCards(report),
       buildFinish(report, select),
       viewer?.element,
+      buildScale(report),
       buildSurface(report),
       buildDepthMaps(report, depthMaps, select),
       buildPlots(report, tooltip),

@@ -64,6 +64,26 @@ TEST_F(OpenExistingModel, WarnsWhenTheReportIsDamagedOrOfAnotherModel) {
   EXPECT_THAT(foreign->warning, HasSubstr("does not know the image"));
 }
 
+TEST_F(OpenExistingModel, WarnsWhenTheReportTellsTheScaleOfOtherModels) {
+  const std::vector<ScaleSection> scale(3);
+  ReportInput input;
+  input.scale = scale;
+  input.components = scenes_;
+  const std::vector<ImageOutcome> images = [&] {
+    std::vector<ImageOutcome> all;
+    for (const View& view : scenes_[0].views) {
+      all.emplace_back().name = view.name;
+    }
+    return all;
+  }();
+  input.images = images;
+  ASSERT_TRUE(write_model(place_, scenes_, build_report(input)));
+  const auto model = open_existing_model(output_);
+  ASSERT_TRUE(model);
+  EXPECT_THAT(model->warning, HasSubstr("the scale of 3 models, there are 2"));
+  EXPECT_TRUE(model->history.scale.empty());
+}
+
 TEST_F(OpenExistingModel, TakesAModelWithoutAReport) {
   std::filesystem::remove(output_ / "model/report.json");
   const auto model = open_existing_model(output_ / "model/sparse");

@@ -37,6 +37,15 @@ ReconstructionReport some_report() {
   report.settings = {{"seed", "7"}};
   report.finish = FinishSection{
       true, "Ready.", 0.01, {{GapKind::kHole, {1, -2, 3}, 0.01, "b.jpg", 40, -10, "go left"}}};
+  report.scale = {
+      {.outcome = ScaleOutcome::kOk,
+       .metres_per_unit = 0.49,
+       .sd_ratio = 0.0012,
+       .lengths = {{"marker 3", 0.1, 0.4901, 0.001, 0.0005}},
+       .markers = {{3, SquareOutcome::kOk, 9, 8, 0.25}, {5, SquareOutcome::kSmallAngle, 4, 4, 0.0}},
+       .z_is_up = true,
+       .up_sd_deg = 0.125},
+      {.outcome = ScaleOutcome::kNothingMeasured, .problem = "no marker", .up_problem = "askew"}};
   return report;
 }
 
@@ -88,6 +97,42 @@ TEST(ReportHistory, MayHaveNoFinish) {
   const auto history = parse_report_history(document.dump());
   ASSERT_TRUE(history) << history.error().message;
   EXPECT_FALSE(history->finish.has_value());
+}
+
+TEST(ReportHistory, KnowsTheScale) {
+  const auto history = parse_report_history(render_report_json(some_report()));
+  ASSERT_TRUE(history) << history.error().message;
+  ASSERT_EQ(history->scale.size(), 2U);
+  const ScaleSection& metric = history->scale[0];
+  EXPECT_EQ(metric.outcome, ScaleOutcome::kOk);
+  EXPECT_EQ(metric.metres_per_unit, 0.49);
+  EXPECT_EQ(metric.sd_ratio, 0.0012);
+  ASSERT_EQ(metric.lengths.size(), 1U);
+  EXPECT_EQ(metric.lengths[0].name, "marker 3");
+  EXPECT_EQ(metric.lengths[0].known_m, 0.1);
+  EXPECT_EQ(metric.lengths[0].metres_per_unit, 0.4901);
+  EXPECT_EQ(metric.lengths[0].sd_ratio, 0.001);
+  EXPECT_EQ(metric.lengths[0].edge_sd_ratio, 0.0005);
+  ASSERT_EQ(metric.markers.size(), 2U);
+  EXPECT_EQ(metric.markers[0].id, 3);
+  EXPECT_EQ(metric.markers[0].views_seen, 9U);
+  EXPECT_EQ(metric.markers[0].views_used, 8U);
+  EXPECT_EQ(metric.markers[0].rms_px, 0.25);
+  EXPECT_EQ(metric.markers[1].outcome, SquareOutcome::kSmallAngle);
+  EXPECT_TRUE(metric.z_is_up);
+  EXPECT_EQ(metric.up_sd_deg, 0.125);
+  EXPECT_EQ(history->scale[1].outcome, ScaleOutcome::kNothingMeasured);
+  EXPECT_EQ(history->scale[1].problem, "no marker");
+  EXPECT_FALSE(history->scale[1].z_is_up);
+  EXPECT_EQ(history->scale[1].up_problem, "askew");
+}
+
+TEST(ReportHistory, MayHaveNoScale) {
+  Json document = Json::parse(render_report_json(some_report()));
+  document.erase("scale");
+  const auto history = parse_report_history(document.dump());
+  ASSERT_TRUE(history) << history.error().message;
+  EXPECT_TRUE(history->scale.empty());
 }
 
 TEST(ReportHistory, MayHaveNoFrames) {
@@ -147,6 +192,20 @@ INSTANTIATE_TEST_SUITE_P(
         Damage{"GapOfAnotherKind",
                [](Json& json) { json["finish"]["gaps"][0]["kind"] = "tear"; },
                "\"kind\""},
+        Damage{"ScaleIsText", [](Json& json) { json["scale"] = "1:20"; }, "\"scale\" is no list"},
+        Damage{"UnknownScaleOutcome",
+               [](Json& json) { json["scale"][0]["outcome"] = "fine"; },
+               "\"outcome\""},
+        Damage{"NoKnownLength",
+               [](Json& json) { json["scale"][0]["lengths"][0].erase("known_m"); },
+               "\"known_m\" is no number"},
+        Damage{"NoMarkers",
+               [](Json& json) { json["scale"][1].erase("markers"); },
+               "\"markers\" is no list"},
+        Damage{"HugeMarker",
+               [](Json& json) { json["scale"][0]["markers"][0]["id"] = 1000; },
+               "\"id\""},
+        Damage{"UnknownUp", [](Json& json) { json["scale"][0]["up"] = "down"; }, "\"up\""},
         Damage{"UnknownOrigin",
                [](Json& json) { json["cameras"][0]["origin"] = "guessed"; },
                "\"origin\""}),

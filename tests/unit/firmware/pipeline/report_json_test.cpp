@@ -94,10 +94,36 @@ TEST(ReportJson, IsTheSameForTheSameReport) {
 
 TEST(ReportJson, HasNoMemberForStagesThatDidNotRun) {
   const Json json = Json::parse(render_report_json(small_report()));
-  for (const char* section : {"dense", "moving", "surface", "texture", "finish"}) {
+  for (const char* section : {"scale", "dense", "moving", "surface", "texture", "finish"}) {
     EXPECT_FALSE(json.contains(section)) << section;
   }
   EXPECT_TRUE(json["metres_per_unit"].is_null());
+}
+
+TEST(ReportJson, TellsOfTheScale) {
+  ReconstructionReport report = small_report();
+  report.scale = {{.outcome = ScaleOutcome::kOk,
+                   .metres_per_unit = 0.491234567,
+                   .sd_ratio = 0.00123456789,
+                   .lengths = {{"marker 3", 0.1, 0.49, 0.001, 0.0005}},
+                   .markers = {{3, SquareOutcome::kTooFewViews, 2, 2, 0.0}},
+                   .z_is_up = true,
+                   .up_sd_deg = 0.12345},
+                  {.outcome = ScaleOutcome::kDisagreement, .problem = "they differ"}};
+  const Json json = Json::parse(render_report_json(report));
+  const Json& metric = json["scale"][0];
+  EXPECT_EQ(metric["unit"], "metre");
+  EXPECT_EQ(metric["outcome"], "ok");
+  EXPECT_EQ(metric["metres_per_mapping_unit"], 0.491235);
+  EXPECT_EQ(metric["sd_ratio"], 0.00123457);
+  EXPECT_EQ(metric["lengths"][0]["name"], "marker 3");
+  EXPECT_EQ(metric["markers"][0]["outcome"], "too_few_views");
+  EXPECT_EQ(metric["up"], "card");
+  EXPECT_EQ(metric["up_sd_deg"], 0.123);
+  EXPECT_EQ(json["scale"][1]["unit"], "arbitrary");
+  EXPECT_EQ(json["scale"][1]["outcome"], "disagreement");
+  EXPECT_EQ(json["scale"][1]["problem"], "they differ");
+  EXPECT_EQ(json["scale"][1]["up"], "none");
 }
 
 TEST(ReportJson, TellsOfDenseSurfaceAndTexture) {

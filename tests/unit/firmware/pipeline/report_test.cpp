@@ -186,12 +186,16 @@ TEST(ReportVerdict, IsCompleteWhenAllImagesAreInOneModel) {
 }
 
 TEST(Report, CarriesSectionsAndScale) {
+  const std::vector<ScaleSection> scale{{.outcome = ScaleOutcome::kOk, .metres_per_unit = 0.5}};
   ReportInput input;
-  input.metres_per_unit = 0.5;
+  input.scale = scale;
   input.dense = DenseSection{.views = 3};
   input.texture = TextureSection{.pages = 2};
   const ReconstructionReport report = build_report(input);
-  EXPECT_EQ(report.units_sentence, "Metric: one model unit is 0.5 m.");
+  EXPECT_THAT(report.units_sentence, StartsWith("Metric: lengths are in metres"));
+  EXPECT_EQ(report.metres_per_unit, 1.0);
+  ASSERT_EQ(report.scale.size(), 1U);
+  EXPECT_EQ(report.scale[0].metres_per_unit, 0.5);
   EXPECT_EQ(report.dense->views, 3U);
   EXPECT_FALSE(report.surface.has_value());
   EXPECT_EQ(report.texture->pages, 2U);

@@ -1,6 +1,8 @@
 #include "firmware/settings/settings.hpp"
 
+#include <map>
 #include <string>
+#include <utility>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -44,6 +46,43 @@ TEST(Settings, ReadsEveryKindOfValue) {
   EXPECT_EQ(settings->storage.quota_mb, 2'000'000'000);
 }
 
+TEST(Settings, ReadsTablesOfMarkers) {
+  const auto settings = parse_settings(
+      "[scale]\nmarker_side_m = 0.1\nmarker_sides_m = { 3 = 0.12, 7 = 0.05 }\n"
+      "marker_distances_m = { 0-1 = 0.5, 3-2 = 1 }\nup = 'card'\n",
+      "f");
+  ASSERT_TRUE(settings) << settings.error().message;
+  EXPECT_EQ(settings->scale.marker_side_m, 0.1);
+  EXPECT_EQ(settings->scale.marker_sides_m, (std::map<int, double>{{3, 0.12}, {7, 0.05}}));
+  EXPECT_EQ(settings->scale.marker_distances_m,
+            (std::map<std::pair<int, int>, double>{{{0, 1}, 0.5}, {{2, 3}, 1.0}}));
+  EXPECT_EQ(settings->scale.up, ScaleSettings::Up::kCard);
+  const auto as_section = parse_settings("[scale.marker_sides_m]\n3 = 0.12\n", "f");
+  ASSERT_TRUE(as_section) << as_section.error().message;
+  EXPECT_EQ(as_section->scale.marker_sides_m.at(3), 0.12);
+}
+
+TEST(Settings, SaysWhatIsWrongInATable) {
+  EXPECT_EQ(complaint("[scale]\nmarker_sides_m = 0.1\n"),
+            "f:2: scale.marker_sides_m: must be a table of the number of a marker = number (m)");
+  EXPECT_EQ(complaint("[scale]\nmarker_sides_m = { x = 0.1 }\n"),
+            "f:2: scale.marker_sides_m.x: the key must be the number of a marker (m)");
+  EXPECT_EQ(complaint("[scale]\nmarker_sides_m = { 1000 = 0.1 }\n"),
+            "f:2: scale.marker_sides_m.1000: the key must be the number of a marker (m)");
+  EXPECT_EQ(complaint("[scale]\nmarker_sides_m = { 3 = 25 }\n"),
+            "f:2: scale.marker_sides_m.3: must be a number in [0.001, 2] (m)");
+  EXPECT_THAT(complaint("[scale]\nmarker_sides_m = { 3 = 'wide' }\n"), HasSubstr("a number in"));
+  EXPECT_THAT(complaint("[scale]\nmarker_sides_m = { 3 = 0.1, 03 = 0.1 }\n"),
+              HasSubstr("is there already"));
+  for (const char* key : {"0", "0-", "-1", "1-1", "0-1-2", "a-b"}) {
+    EXPECT_THAT(complaint(std::string("[scale]\nmarker_distances_m = { ") + key + " = 0.5 }\n"),
+                HasSubstr("the numbers of two markers"))
+        << key;
+  }
+  EXPECT_THAT(complaint("[scale]\nmarker_distances_m = { 0-1 = 0.5, 1-0 = 0.5 }\n"),
+              HasSubstr("is there already"));
+}
+
 TEST(Settings, WritesWhatItReads) {
   Settings settings;
   settings.camera.device = "a \"quoted\" \\ name";
@@ -52,6 +91,10 @@ TEST(Settings, WritesWhatItReads) {
   settings.trigger.double_press = std::chrono::milliseconds(0);
   settings.log.level = LogSettings::Level::kDebug;
   settings.storage.remove_old = StorageSettings::Removal::kWhenNeeded;
+  settings.scale.dictionary = ScaleSettings::Dictionary::kBits6Of250;
+  settings.scale.marker_sides_m = {{0, 0.1}, {249, 1.0 / 3.0}};
+  settings.scale.marker_distances_m = {{{0, 249}, 2.0}};
+  settings.scale.up = ScaleSettings::Up::kCard;
   const auto again = parse_settings(render_settings(settings), "f");
   ASSERT_TRUE(again) << again.error().message;
   EXPECT_EQ(*again, settings);
@@ -91,6 +134,14 @@ TEST(Settings, RefusesValuesThatDoNotGoTogether) {
             "f:3: trigger.double_press_ms: must be 0 or longer than debounce_ms");
   EXPECT_EQ(complaint("[indicator]\nbuzzer_line = 27\n"),
             "f:2: indicator.buzzer_line: is the line of the light already");
+  EXPECT_THAT(complaint("[scale]\nmarker_sides_m = { 50 = 0.1 }\n"),
+              HasSubstr("f:2: scale.marker_sides_m: a marker is not in the dictionary"));
+  EXPECT_THAT(complaint("[scale]\nmarker_distances_m = { 0-50 = 0.1 }\n"),
+              HasSubstr("f:2: scale.marker_distances_m: a marker is not in the dictionary"));
+  EXPECT_EQ(complaint("[scale]\nmarker_sides_m = { 50 = 0.1 }\ndictionary = '4x4_100'\n"),
+            "accepted");
+  EXPECT_EQ(complaint("[scale]\nup = 'card'\n"),
+            "f:2: scale.up: card needs a side or a distance of markers");
   EXPECT_EQ(complaint("[storage]\nroot = 'sessions'\n"),
             "f:2: storage.root: must be a path that begins with /");
 }

@@ -205,7 +205,7 @@ TEST(ArucoOnData, MarkersOfTheOrbitAreFoundNearTheirTrueProjections) {
   ASSERT_GT(found, 16) << "corners";
   EXPECT_EQ(wrong_ids, 0);
   RecordProperty("mean_error_px", std::to_string(error_sum / found));
-  EXPECT_LT(error_sum / found, 0.3) << "pixels, mean of " << found << " corners";
+  EXPECT_LT(error_sum / found, 0.1) << "pixels, mean of " << found << " corners";
 }
 
 }  // namespace

@@ -244,6 +244,17 @@ TEST(Glb, RefusesMeshesThatContradictThemselves) {
   }
 }
 
+TEST(Glb, StandsUprightOffAWorldWhoseZIsUp) {
+  GlbOptions options;
+  options.placement.model_from_world = y_up_from_z_up();
+  EXPECT_LT(
+      (options.placement.direction(Eigen::Vector3f::UnitZ()) - Eigen::Vector3f::UnitY()).norm(),
+      1e-6F);
+  EXPECT_LT(
+      (options.placement.direction(Eigen::Vector3f::UnitX()) - Eigen::Vector3f::UnitX()).norm(),
+      1e-6F);
+}
+
 TEST(Glb, RefusesAScaleThatIsNone) {
   GlbOptions options;
   options.placement.metres_per_unit = 0.0;

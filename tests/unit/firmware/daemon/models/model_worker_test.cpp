@@ -37,11 +37,11 @@ std::vector<std::vector<std::uint8_t>> few_pictures() {
   return pictures;
 }
 
-ModelWorkerOptions quick_options() {
+ModelWorkerOptions quick_options(const ScaleSettings& scale = {}) {
   ReconstructionSettings settings;
   settings.preset = ReconstructionSettings::Preset::kPreview;
   settings.threads = 2;
-  ModelWorkerOptions options = model_worker_options(settings, "test");
+  ModelWorkerOptions options = model_worker_options(settings, scale, "test");
   options.reconstruction.features.upsample = false;
   options.reconstruction.build.texture_size_px = 512;
   return options;
@@ -116,6 +116,22 @@ TEST(ModelWorker, MakesTheModelOfASession) {
   EXPECT_THAT(contents(session.model() / "sparse/images.txt"), HasSubstr("000001.jpg"));
   EXPECT_FALSE(fs::exists(session.work_folder()));
   EXPECT_FALSE(fs::exists(session.staged_model()));
+}
+
+TEST(ModelWorker, MakesAModelInMetresOffTheMarkersOfTheSettings) {
+  DemoStore store;
+  ScaleSettings scale;
+  scale.marker_side_m = 0.1;
+  const std::string id = store.add(few_pictures(), demo_camera_profile());
+  const ModelAnswer answer = Work(quick_options(scale)).make(store.open(id));
+  EXPECT_EQ(answer.outcome, ModelOutcome::kReady) << answer.message;
+  EXPECT_THAT(contents(store.open(id).model() / "report.json"), HasSubstr("\"unit\": \"metre\""));
+
+  scale.marker_sides_m[0] = 0.2;
+  const std::string wrong = store.add(few_pictures(), demo_camera_profile());
+  const ModelAnswer told = Work(quick_options(scale)).make(store.open(wrong));
+  EXPECT_EQ(told.outcome, ModelOutcome::kReady);
+  EXPECT_THAT(told.message, HasSubstr("It has no scale: the known lengths disagree"));
 }
 
 TEST(ModelWorker, GivesTheSameBytesAfterAStopInAnyStage) {
@@ -244,7 +260,7 @@ TEST(ModelWorkerOptions, FollowTheSettings) {
   settings.threads = 5;
   settings.priority = 19;
   settings.seed = 7;
-  const ModelWorkerOptions options = model_worker_options(settings, "1.2");
+  const ModelWorkerOptions options = model_worker_options(settings, ScaleSettings{}, "1.2");
   EXPECT_TRUE(options.validate());
   EXPECT_EQ(options.nice, 19);
   EXPECT_EQ(options.reconstruction.build.preset, QualityPreset::kFine);
@@ -253,9 +269,27 @@ TEST(ModelWorkerOptions, FollowTheSettings) {
   EXPECT_EQ(options.reconstruction.seed, 7U);
   EXPECT_EQ(options.reconstruction.software_version, "1.2");
   settings.threads = 0;
-  EXPECT_GE(model_worker_options(settings, "").reconstruction.num_threads, 1);
+  EXPECT_GE(model_worker_options(settings, ScaleSettings{}, "").reconstruction.num_threads, 1);
+  EXPECT_FALSE(options.reconstruction.scale.known.any());
   const ModelWorkerOptions too_nice{.reconstruction = {}, .nice = 20};
   EXPECT_FALSE(too_nice.validate());
+}
+
+TEST(ModelWorkerOptions, KnowTheMarkersOfTheSettings) {
+  ScaleSettings scale;
+  scale.dictionary = ScaleSettings::Dictionary::kBits5Of250;
+  scale.marker_side_m = 0.1;
+  scale.marker_sides_m = {{249, 0.2}};
+  scale.marker_distances_m = {{{0, 1}, 0.5}};
+  scale.up = ScaleSettings::Up::kCard;
+  const ModelWorkerOptions options = model_worker_options({}, scale, "");
+  EXPECT_TRUE(options.validate());
+  const ScaleOptions& known = options.reconstruction.scale;
+  EXPECT_EQ(to_string(known.dictionary), "5x5_250");
+  EXPECT_EQ(known.known.side_m(3), 0.1);
+  EXPECT_EQ(known.known.side_m(249), 0.2);
+  EXPECT_EQ(known.known.distance_m.at({0, 1}), 0.5);
+  EXPECT_EQ(known.up, UpSource::kCard);
 }
 
 }  // namespace
