@@ -14,6 +14,7 @@
 #include "firmware/pipeline/memory_plan.hpp"
 #include "firmware/pipeline/model_writer.hpp"
 #include "firmware/pipeline/moving_matches.hpp"
+#include "firmware/pipeline/reconstruction_report.hpp"
 #include "firmware/pipeline/stopwatch.hpp"
 #include "firmware/pipeline/surface_building.hpp"
 #include "firmware/pipeline/worker_pool.hpp"
@@ -68,93 +69,6 @@ std::vector<GroupingImage> grouping_images(const PhotoSet& photos,
     result.push_back({photos.names[i], images[i].features ? &*images[i].features : nullptr});
   }
   return result;
-}
-
-std::vector<ReportSetting> report_settings(const ReconstructionOptions& options,
-                                           const MemoryPlan& plan) {
-  return {{"features", std::string(to_string(options.feature_kind))},
-          {"features per image, at most", std::to_string(plan.features.max_keypoints)},
-          {"image size doubled", plan.features.upsample ? "yes" : "no"},
-          {"pairs", std::string(to_string(options.pair_mode))},
-          {"seed", std::to_string(options.seed)}};
-}
-
-std::vector<IntrinsicsOrigin> origins_of(const CameraGroups& cameras) {
-  std::vector<IntrinsicsOrigin> origins;
-  for (const CameraGroup& group : cameras.groups) {
-    origins.push_back(group.knowledge == IntrinsicsKnowledge::kGiven ? IntrinsicsOrigin::kGiven
-                      : group.knowledge == IntrinsicsKnowledge::kPrior
-                          ? IntrinsicsOrigin::kPriorRefined
-                          : IntrinsicsOrigin::kSolved);
-  }
-  return origins;
-}
-
-std::vector<PairEvidence> evidence_of(const std::vector<PairRecord>& pairs) {
-  std::vector<PairEvidence> evidence;
-  for (const PairRecord& record : pairs) {
-    evidence.push_back({record.pair,
-                        record.geometry.kind,
-                        record.geometry.candidates,
-                        record.geometry.inliers.size()});
-  }
-  return evidence;
-}
-
-/// The models as they are published, and what became of each photograph.
-struct FinishedModels {
-  std::span<const ImageOutcome> outcomes;
-  const ScaledModels& scaled;
-};
-
-ReconstructionReport report_on(const PhotoSet& photos,
-                               const ReconstructionOptions& options,
-                               const MemoryPlan& plan,
-                               const CameraGroups& cameras,
-                               const std::vector<PairRecord>& pairs,
-                               const FinishedModels& models) {
-  const std::vector<PairEvidence> evidence = evidence_of(pairs);
-  const std::vector<IntrinsicsOrigin> origins = origins_of(cameras);
-  ReportInput input;
-  input.components = models.scaled.components;
-  input.scale = models.scaled.scale;
-  input.images = models.outcomes;
-  input.frames = photos.frames;
-  input.pairs = evidence;
-  input.intrinsics_origins = origins;
-  input.settings = report_settings(options, plan);
-  for (const std::string& sentence : photos.warnings) {
-    input.notes.push_back({NoteSeverity::kWarning, sentence});
-  }
-  for (const std::string& sentence : plan.lowered) {
-    input.notes.push_back({NoteSeverity::kWarning, sentence});
-  }
-  input.software_version = options.software_version;
-  input.input_description = photos.description;
-  return build_report(input);
-}
-
-/// A report on a model that was made before.
-ReconstructionReport report_on_model(const PhotoSet& photos,
-                                     const ReconstructionOptions& options,
-                                     const ExistingModel& model) {
-  const ReportHistory& history = model.history;
-  ReportInput input;
-  input.components = model.components;
-  input.images = history.images;
-  input.frames = history.frames;
-  input.pairs = history.pairs;
-  input.scale = history.scale;
-  input.intrinsics_origins = history.intrinsics_origins;
-  input.settings = history.settings;
-  input.finish = history.finish;
-  if (!model.warning.empty()) {
-    input.notes.push_back({NoteSeverity::kWarning, model.warning});
-  }
-  input.software_version = options.software_version;
-  input.input_description =
-      history.input_description.empty() ? photos.description : history.input_description;
-  return build_report(input);
 }
 
 /// Whether nothing that could still follow needs the work folder.
@@ -286,30 +200,6 @@ Result<MappedPhotos> map_features(const Run& run,
              : map_photos(run.photos, images, cameras, pairs, mapper, context);
 }
 
-std::size_t registered_count(const MappedPhotos& mapped) {
-  return mapped.components.empty() ? 0 : mapped.components.front().registered_count();
-}
-
-/// Maps, and if the poses show that something moved, maps again without its matches. A second
-/// model that holds fewer images is no gain.
-Result<MappedPhotos> map_what_stood_still(const Run& run,
-                                          const PhotoFeatures& features,
-                                          const std::vector<PairRecord>& pairs,
-                                          const StageContext& context) {
-  TM_ASSIGN_OR_RETURN(MappedPhotos mapped, map_features(run, features, pairs, context));
-  if (run.options.build.moving == MovingUse::kOff || mapped.components.empty()) {
-    return mapped;
-  }
-  TM_ASSIGN_OR_RETURN(
-      const auto still,
-      drop_moving_matches(mapped.components.front(), features.images, pairs, context));
-  if (!still) {
-    return mapped;
-  }
-  TM_ASSIGN_OR_RETURN(MappedPhotos again, map_features(run, features, *still, context));
-  return registered_count(again) >= registered_count(mapped) ? std::move(again) : std::move(mapped);
-}
-
 /// The models in metres, where known lengths allow it.
 Result<ScaledModels> scale_models(const Run& run,
                                   std::vector<Scene> components,
@@ -321,6 +211,76 @@ Result<ScaledModels> scale_models(const Run& run,
   return models;
 }
 
+/// What mapping is made from, and what the report tells of it.
+struct MappingInput {
+  const MemoryPlan& plan;
+  const PhotoFeatures& features;
+  const std::vector<PairRecord>& pairs;
+};
+
+/// The models that can be seen.
+struct PublishedModels {
+  std::vector<Scene> components;
+  ReconstructionSummary summary;
+};
+
+Result<PublishedModels> publish(const Run& run,
+                                const MappingInput& input,
+                                MappedPhotos mapped,
+                                const StageContext& context) {
+  TM_ASSIGN_OR_RETURN(ScaledModels models,
+                      scale_models(run, std::move(mapped.components), context));
+  run.listener.on_progress({Stage::kWrite, 0, 1});
+  ReconstructionSummary summary{report_on(run.photos,
+                                          run.options,
+                                          input.plan,
+                                          input.features.cameras,
+                                          input.pairs,
+                                          {mapped.outcomes, models}),
+                                {}};
+  TM_RETURN_IF_ERROR(write_model(run.places.model, models.components, summary.report));
+  run.listener.on_progress({Stage::kWrite, 1, 1});
+  run.stopwatch.finish(Stage::kWrite);
+  return PublishedModels{std::move(models.components), std::move(summary)};
+}
+
+/// The model that comes of the matches on what stood still, when the poses of the first one show
+/// that something moved. Nothing when nothing did, or when it would hold fewer images.
+Result<std::optional<MappedPhotos>> map_what_stood_still(const Run& run,
+                                                         const MappingInput& input,
+                                                         const Scene& first,
+                                                         const StageContext& context) {
+  TM_ASSIGN_OR_RETURN(const auto still,
+                      drop_moving_matches(first, input.features.images, input.pairs, context));
+  run.stopwatch.finish(Stage::kMoving);
+  if (!still) {
+    return std::optional<MappedPhotos>();
+  }
+  TM_ASSIGN_OR_RETURN(MappedPhotos again, map_features(run, input.features, *still, context));
+  run.stopwatch.finish(Stage::kMap);
+  const bool holds_as_many =
+      !again.components.empty() &&
+      again.components.front().registered_count() >= first.registered_count();
+  return holds_as_many ? std::optional(std::move(again)) : std::nullopt;
+}
+
+/// The first model is published before it is known whether something moved: somebody waits for it.
+Result<PublishedModels> map_and_publish(const Run& run,
+                                        const MappingInput& input,
+                                        const StageContext& context) {
+  TM_ASSIGN_OR_RETURN(MappedPhotos mapped, map_features(run, input.features, input.pairs, context));
+  run.stopwatch.finish(Stage::kMap);
+  const bool looks_for_movers =
+      run.options.build.moving != MovingUse::kOff && !mapped.components.empty();
+  const Scene first = looks_for_movers ? mapped.components.front() : Scene();
+  TM_ASSIGN_OR_RETURN(PublishedModels published, publish(run, input, std::move(mapped), context));
+  if (!looks_for_movers) {
+    return published;
+  }
+  TM_ASSIGN_OR_RETURN(auto still, map_what_stood_still(run, input, first, context));
+  return still ? publish(run, input, *std::move(still), context) : std::move(published);
+}
+
 Result<ReconstructionSummary> run_stages(const Run& run) {
   const ReconstructionOptions& options = run.options;
   TM_ASSIGN_OR_RETURN(const MemoryPlan plan, plan_for(run.photos, options));
@@ -328,24 +288,15 @@ Result<ReconstructionSummary> run_stages(const Run& run) {
   const StageContext context{pool, run.checkpoints, run.listener, run.stop};
   TM_ASSIGN_OR_RETURN(const PhotoFeatures features, extract(run, plan));
   TM_ASSIGN_OR_RETURN(const auto pairs, match(run, features, context));
-  TM_ASSIGN_OR_RETURN(MappedPhotos mapped, map_what_stood_still(run, features, pairs, context));
-  run.stopwatch.finish(Stage::kMap);
-  TM_ASSIGN_OR_RETURN(const ScaledModels models,
-                      scale_models(run, std::move(mapped.components), context));
-
-  run.listener.on_progress({Stage::kWrite, 0, 1});
-  ReconstructionSummary summary{
-      report_on(run.photos, options, plan, features.cameras, pairs, {mapped.outcomes, models}), {}};
-  TM_RETURN_IF_ERROR(write_model(run.places.model, models.components, summary.report));
-  run.listener.on_progress({Stage::kWrite, 1, 1});
-  run.stopwatch.finish(Stage::kWrite);
+  TM_ASSIGN_OR_RETURN(PublishedModels models,
+                      map_and_publish(run, {plan, features, pairs}, context));
   if (!models.components.empty()) {
     TM_RETURN_IF_ERROR(build_surface({run.photos, models.components, run.places.model, options},
                                      context,
                                      run.stopwatch,
-                                     summary.report));
+                                     models.summary.report));
   }
-  return summary;
+  return std::move(models.summary);
 }
 
 /// What the selector has to know of the lens.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <vector>
 
@@ -21,11 +22,17 @@ class Stopwatch {
   explicit Stopwatch(const Clock& clock)
       : clock_(&clock), last_(clock.now()), last_cpu_(cpu_clock_.now()) {}
 
-  /// The time since the stage before ended belongs to `stage`.
+  /// The time since the stage before ended belongs to `stage`, which may come again.
   void finish(Stage stage) {
     const auto now = clock_->now();
     const auto cpu = cpu_clock_.now();
-    times_.push_back({stage, now - last_, cpu - last_cpu_});
+    auto time = std::find_if(
+        times_.begin(), times_.end(), [&](const StageTime& one) { return one.stage == stage; });
+    if (time == times_.end()) {
+      time = times_.insert(times_.end(), StageTime{stage, {}, {}});
+    }
+    time->duration += now - last_;
+    time->cpu_time += cpu - last_cpu_;
     last_ = now;
     last_cpu_ = cpu;
   }
