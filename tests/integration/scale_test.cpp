@@ -20,20 +20,26 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
-constexpr std::chrono::seconds kTimeLimit{100};
+constexpr std::chrono::seconds kTimeLimit{200};
 constexpr double kDegPerRad = 57.29577951308232;
 
 class Scale : public ScratchTest {
  protected:
   void SetUp() override {
     ScratchTest::SetUp();
+    take_demo_frames(4);
+  }
+
+  /// Every `step`-th frame of the demo recording.
+  void take_demo_frames(std::size_t step) const {
+    fs::remove_all(path("photos"));
     fs::create_directories(path("photos"));
     std::vector<fs::path> frames;
     for (const auto& entry : fs::directory_iterator(demo() / "images")) {
       frames.push_back(entry.path());
     }
     std::sort(frames.begin(), frames.end());
-    for (std::size_t i = 0; i < frames.size(); i += 4) {
+    for (std::size_t i = 0; i < frames.size(); i += step) {
       fs::copy_file(frames[i], fs::path(path("photos")) / frames[i].filename());
     }
   }
@@ -156,8 +162,9 @@ TEST_F(Scale, GoesThroughToTheMeshAndStaysWhenItIsMadeAgain) {
 }
 
 TEST_F(Scale, AnotherSideLeavesNothingOfTheOldOneBehind) {
+  take_demo_frames(8);
   const auto dense = [&](const std::string& side, const std::string& output) {
-    return run({"--marker-side", side, "--depth-size", "128", "--stop-after", "dense"}, output);
+    return run({"--marker-side", side, "--depth-size", "64", "--stop-after", "dense"}, output);
   };
   ASSERT_EQ(dense("0.1", "out").exit_code, 0);
   ASSERT_TRUE(fs::exists(path("out/work"))) << "depth maps stay after this stage";
