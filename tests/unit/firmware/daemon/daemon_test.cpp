@@ -65,12 +65,12 @@ TEST_F(Video, TheMakerOfModelsHearsOfTheCaptureFrameByFrame) {
   await("frame", "\"frames\":2}");
   press_and_release();
   await("phase", "working");
+  await_that([&] { return models_.news().back() == "ended"; });  // the storage's thread tells it
   const auto news = models_.news();
   ASSERT_GE(news.size(), 4U);
   EXPECT_EQ(news.front(), "began");
   EXPECT_EQ(news[1], "frame 1");
   EXPECT_EQ(news[2], "frame 2");
-  EXPECT_EQ(news.back(), "ended");
 }
 
 TEST_F(Video, AdviceFollowsTheMapAndIsShownAndWrittenDown) {
