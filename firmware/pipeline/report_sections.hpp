@@ -101,7 +101,7 @@ struct SurfaceSection {
 struct FinishGap {
   GapKind kind = GapKind::kHole;
   Eigen::Vector3d center_in_world = Eigen::Vector3d::Zero();
-  double area_ratio = 0.0;     ///< of the subject's area
+  double area_ratio = 0.0;     ///< of the whole area, with what is missing
   std::string photograph;      ///< taken from most nearly the right place
   double turn_left_deg = 0.0;  ///< from there around the gap; to the right < 0
   double rise_deg = 0.0;  ///< above the horizon of the gap, more than that photograph; < 0 lower
@@ -112,7 +112,7 @@ struct FinishGap {
 struct FinishSection {
   bool ready = false;
   std::string sentence;
-  double gap_ratio = 0.0;  ///< area of all gaps that photographs would close, of the subject's
+  double gap_ratio = 0.0;         ///< area of all gaps that photographs would close, likewise
   std::vector<FinishGap> gaps{};  ///< the largest first; as many as are worth telling
 };
 

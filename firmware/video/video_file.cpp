@@ -33,6 +33,10 @@ constexpr const char* kContainers =
     "mov,mp4,matroska,webm,avi,mpegts,mpeg,mpegvideo,m4v,h264,hevc,av1,obu,ivf,flv,asf,ogg,gif,nut,"
     "mxf,dv,mjpeg,yuv4mpegpipe,wav,mp3,aac,flac";
 
+constexpr const char* kWhatIsAsked =
+    "format=duration:stream=index,codec_type,codec_name,width,height,duration,nb_frames,"
+    "avg_frame_rate:stream_disposition=attached_pic:stream_side_data=rotation";
+
 /// A name that is taken as a file whatever it begins with.
 std::string as_file(const fs::path& path) {
   return "file:" + path.string();
@@ -79,14 +83,7 @@ Result<ChildExit> run_tool(const ChildCommand& command,
 Result<std::string> ask_ffprobe(const fs::path& file, const std::stop_token& stop) {
   std::string answer;
   ChildCommand command{
-      {"ffprobe",
-       "-loglevel",
-       "error",
-       "-of",
-       "json",
-       "-show_entries",
-       "format=duration:stream=index,codec_type,codec_name,width,height,duration,nb_frames,"
-       "avg_frame_rate:stream_disposition=attached_pic:stream_side_data=rotation"},
+      {"ffprobe", "-loglevel", "error", "-of", "json", "-show_entries", kWhatIsAsked},
       [&answer, &file](std::string_view piece) -> Result<> {
         answer.append(piece);
         if (answer.size() > kMaxAnswerBytes) {

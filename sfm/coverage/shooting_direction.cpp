@@ -19,7 +19,8 @@ constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 constexpr double kUpperEdgeWeight = 0.005;
 constexpr double kDistanceQuantile = 0.25;
 constexpr double kBelowLowestRad = 20.0 * kRadPerDeg;
-constexpr double kHighestRad = 85.0 * kRadPerDeg;
+constexpr double kAboveHighestRad = 40.0 * kRadPerDeg;
+constexpr double kZenithRad = 85.0 * kRadPerDeg;
 constexpr double kGoodShare = 0.7;
 constexpr double kLeastShare = 0.25;
 constexpr double kLeastCosine = 0.3;
@@ -49,8 +50,9 @@ struct Surroundings {
   const SurfaceGap& gap;
   const TriangleMesh& mesh;
   Eigen::Vector3d up;
-  double distance = 0.0;    ///< from which it would be shot
-  double lowest_rad = 0.0;  ///< elevation
+  double distance = 0.0;     ///< from which it would be shot
+  double lowest_rad = 0.0;   ///< elevation
+  double highest_rad = 0.0;  ///< the same
 };
 
 Surroundings surroundings_of(const SurfaceGap& gap,
@@ -58,16 +60,23 @@ Surroundings surroundings_of(const SurfaceGap& gap,
                              std::span<const DenseView> views,
                              const Eigen::Vector3d& up) {
   std::vector<double> distances;
-  double lowest = kHighestRad;
+  double lowest = kZenithRad;
+  double highest = -kZenithRad;
   for (const DenseView& view : views) {
     const Eigen::Vector3d ray = camera_center(view.cam_from_world) - gap.center;
     distances.push_back(ray.norm());
     lowest = std::min(lowest, elevation_rad(ray, up));
+    highest = std::max(highest, elevation_rad(ray, up));
   }
   const auto at = distances.begin() + static_cast<std::ptrdiff_t>(
                                           kDistanceQuantile * static_cast<double>(views.size()));
   std::nth_element(distances.begin(), at, distances.end());
-  return {gap, mesh, up, *at, lowest - kBelowLowestRad};
+  return {gap,
+          mesh,
+          up,
+          *at,
+          lowest - kBelowLowestRad,
+          std::min(highest + kAboveHighestRad, kZenithRad)};
 }
 
 /// A camera at `direction` from the gap, which fills most of its picture.
@@ -117,7 +126,7 @@ double visible_area(const Surroundings& around, const Eigen::Vector3d& direction
 std::optional<Eigen::Vector3d> reachable(const Eigen::Vector3d& direction,
                                          const Surroundings& around) {
   const double elevation = elevation_rad(direction, around.up);
-  const double allowed = std::clamp(elevation, around.lowest_rad, kHighestRad);
+  const double allowed = std::clamp(elevation, around.lowest_rad, around.highest_rad);
   const Eigen::Vector3d level = direction - direction.dot(around.up) * around.up;
   if (elevation == allowed) {
     return direction;

@@ -30,7 +30,7 @@ struct ShootingDirection {
 
 /// The direction from which most of a gap would be seen: its normal, or up to 50 degrees beside it
 /// where something stands in front, never lower than 20 degrees below the lowest view nor higher
-/// than 85 degrees above the horizon. Nothing when no such place sees a quarter of it: it lies
+/// than 40 degrees above the highest. Nothing when no such place sees a quarter of it: it lies
 /// underneath or inside. Draws the mesh up to 15 times, in parallel. Precondition: at least one
 /// view.
 [[nodiscard]] std::optional<ShootingDirection> find_shooting_direction(

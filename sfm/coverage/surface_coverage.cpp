@@ -21,6 +21,7 @@ SurfaceCoverage measure_surface_coverage(const TriangleMesh& mesh,
   }
   const SurfaceGaps found = find_gaps(mesh, views, measure_coverage(mesh, views, executor));
   const Eigen::Vector3d up = up_of_views(views);
+  double whole_area = found.subject_area;
   for (std::size_t i = 0; i < std::min(found.gaps.size(), kMostGaps); ++i) {
     const SurfaceGap& gap = found.gaps[i];
     if (gap.area < kLeastGapRatio * found.subject_area) {
@@ -28,12 +29,16 @@ SurfaceCoverage measure_surface_coverage(const TriangleMesh& mesh,
     }
     executor.stop_point();
     if (const auto direction = find_shooting_direction(gap, mesh, views, up, executor)) {
+      whole_area += direction->visible_area * gap.hole_area / gap.area;
       result.gaps.push_back({2.0 * gap.hole_area > gap.area ? GapKind::kHole : GapKind::kWeak,
                              gap.center,
-                             direction->visible_area / found.subject_area,
+                             0.0,
                              *direction});
-      result.gap_ratio += result.gaps.back().area_ratio;
     }
+  }
+  for (ReachableGap& gap : result.gaps) {
+    gap.area_ratio = gap.direction.visible_area / whole_area;
+    result.gap_ratio += gap.area_ratio;
   }
   std::stable_sort(
       result.gaps.begin(), result.gaps.end(), [](const ReachableGap& a, const ReachableGap& b) {

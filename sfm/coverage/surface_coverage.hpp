@@ -16,14 +16,15 @@ namespace trigmesh {
 struct ReachableGap {
   GapKind kind = GapKind::kWeak;  ///< of the larger part of it
   Eigen::Vector3d center_in_world = Eigen::Vector3d::Zero();
-  double area_ratio = 0.0;  ///< what would be seen of it, of the subject's area
+  double area_ratio = 0.0;  ///< what would be seen of it, of the whole area
   ShootingDirection direction;
 };
 
-/// What the views have not seen well, and could.
+/// What the views have not seen well, and could. The whole area is that of the subject with what is
+/// missing of it.
 struct SurfaceCoverage {
   std::vector<ReachableGap> gaps;  ///< by falling area
-  double gap_ratio = 0.0;          ///< sum of their areas, of the subject's area
+  double gap_ratio = 0.0;          ///< sum of their areas, of the whole area
 };
 
 /// Judges a finished surface by its borders and by which views see it: where is a hole or too few

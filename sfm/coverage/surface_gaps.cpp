@@ -20,6 +20,7 @@ constexpr std::uint32_t kEnoughViews = 3;
 constexpr double kEnoughParallaxRad = 5.0 * std::numbers::pi / 180.0;
 constexpr double kSubjectRatio = 0.5;
 constexpr double kReliefRatio = 0.75;
+constexpr double kInsideRatio = 0.8;
 // Pieces are gathered in cubes of this part of the side of a square as large as the subject, but of
 // so many mean faces at least.
 constexpr double kCellRatio = 1.0 / 30.0;
@@ -135,13 +136,11 @@ class PieceFinder {
       longest = std::max(longest, length_of(mesh_, loop));
     }
     for (const BoundaryLoop& loop : topology.boundary_loops) {
-      const PartShape& part = parts_[part_of_vertex[loop.front()]];
-      const bool is_relief = part.area_vector.norm() > kReliefRatio * part.area;
-      if (is_relief && length_of(mesh_, loop) >= part.longest_border) {
+      if (ends_a_relief(loop, parts_[part_of_vertex[loop.front()]]) || leaves_the_subject(loop)) {
         continue;
       }
       for (const GapPiece& piece : pieces_of_hole(mesh_, loop)) {
-        if (piece.area > 0.0 && framing_views(piece.position, views_) >= least_framing_) {
+        if (piece.area > 0.0) {
           pieces_.push_back(piece);
         }
       }
@@ -158,6 +157,20 @@ class PieceFinder {
   }
 
  private:
+  [[nodiscard]] bool ends_a_relief(const BoundaryLoop& loop, const PartShape& part) const {
+    return part.area_vector.norm() > kReliefRatio * part.area &&
+           length_of(mesh_, loop) >= part.longest_border;
+  }
+
+  /// Whether the surface ends there because the pictures do.
+  [[nodiscard]] bool leaves_the_subject(const BoundaryLoop& loop) const {
+    const auto inside = std::count_if(loop.begin(), loop.end(), [this](std::uint32_t vertex) {
+      const Eigen::Vector3d point = mesh_.positions[vertex].cast<double>();
+      return framing_views(point, views_) >= least_framing_;
+    });
+    return static_cast<double>(inside) < kInsideRatio * static_cast<double>(loop.size());
+  }
+
   std::vector<std::uint32_t> find_parts() {
     const MeshComponents components = find_components(mesh_);
     parts_.resize(components.areas.size());

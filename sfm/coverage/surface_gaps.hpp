@@ -37,10 +37,11 @@ struct SurfaceGaps {
 
 /// Finds where a surface is open or weak. Only the subject counts: what lies in the picture of at
 /// least half as many views as the median of what the views show; what is around it is in few
-/// pictures, and nobody wanted it. A border is a hole unless the piece of surface that it belongs
-/// to is more flat than round (a relief: its area vectors add up to more than 0.75 of its area, as
-/// those of a cap of a sphere up to 60 degrees from its pole) and it is the longest border of that
-/// piece. `coverage`: of measure_coverage for the same mesh and views.
+/// pictures, and nobody wanted it. A border is no hole where the surface ends because the
+/// pictures do (less than 0.8 of its vertices belong to the subject), nor when it is the longest of
+/// a piece of surface that is more flat than round: a relief, whose area vectors add up to more
+/// than 0.75 of its area, as those of a cap of a sphere up to 60 degrees from its pole. `coverage`:
+/// of measure_coverage for the same mesh and views.
 [[nodiscard]] SurfaceGaps find_gaps(const TriangleMesh& mesh,
                                     std::span<const DenseView> views,
                                     std::span<const FaceCoverage> coverage);

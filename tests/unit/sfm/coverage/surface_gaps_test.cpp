@@ -58,6 +58,22 @@ TEST(SurfaceGaps, TakesTheBorderOfAReliefForItsEnd) {
   EXPECT_GT(found.gaps[0].normal.x(), 0.99);
 }
 
+TEST(SurfaceGaps, TakesTheBorderAtTheEndOfThePicturesForItsEnd) {
+  // A corner of two walls, no relief, which runs on to where few pictures reach.
+  TriangleMesh corner;
+  test::add_square({0, 5, 0}, {0, 5, 0}, {0, 0, 5}, 24, corner);
+  test::add_square({5, 0, 0}, {0, 0, 5}, {5, 0, 0}, 24, corner);
+  corner = test::welded(corner);
+  std::vector<DenseView> views;
+  for (const double azimuth_deg : {30.0, 40.0, 50.0, 60.0}) {
+    views.push_back(test::view_from(6 * test::direction(azimuth_deg, 0)));
+  }
+  const SurfaceGaps found = gaps_of(corner, views);
+  for (const SurfaceGap& gap : found.gaps) {
+    EXPECT_EQ(gap.hole_area, 0.0);
+  }
+}
+
 TEST(SurfaceGaps, DoesNotMindWhatIsAroundTheSubject) {
   TriangleMesh mesh = test::make_box({});
   // A large ground far outside of most pictures, and so seen by few.
