@@ -118,7 +118,7 @@ Evidence gather(const MovingView& view,
   }
   evidence.marks.moving |= evidence.hidden;
   if (!view.depth.empty()) {
-    evidence.marks.moving.setTo(0, view.depth > 0.0F);
+    evidence.marks.moving.setTo(0, view.depth > 0.0);
     evidence.marks.fixed = large_surfaces(view.depth, options);
   }
   return evidence;
