@@ -150,7 +150,7 @@ struct FilterInput {
 Result<PosedDepthMap> load_posed(const FilterInput& input, std::size_t view) {
   TM_ASSIGN_OR_RETURN(DepthMap map, input.maps.load(view));
   if (!map.depth.empty() && !input.images[view].mask.empty()) {
-    map.depth.setTo(0.0F, input.images[view].mask == 0);
+    map.depth.setTo(0.0, input.images[view].mask == 0);
   }
   return PosedDepthMap{std::move(map), input.dense.views[view].cam_from_world};
 }

@@ -208,7 +208,9 @@ std::vector<std::size_t> SequenceMatcher::look_alikes_of(std::size_t frame, std:
   std::stable_sort(
       ranked.begin(), ranked.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
   std::vector<std::size_t> chosen;
-  for (const auto& [matches, other] : ranked) {
+  for (const auto& candidate : ranked) {
+    const std::size_t matches = candidate.first;
+    const std::size_t other = candidate.second;
     if (matches < options_.min_preemptive_matches || chosen.size() == options_.max_far_pairs) {
       break;
     }
