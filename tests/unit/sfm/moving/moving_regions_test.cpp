@@ -51,7 +51,7 @@ TEST(MovingRegions, CoverABoardInFrontOfNothingThatHasDepth) {
   for (std::size_t i = 0; i < scene.views.size(); ++i) {
     // Plain sky in place of the wall.
     scene.views[i].rgb.setTo(cv::Scalar(230, 235, 240), scene.truth[i] == 0);
-    scene.views[i].depth.setTo(0.0F);
+    scene.views[i].depth.setTo(0.0);
   }
   const std::vector<cv::Mat> masks = find_in(scene);
   for (std::size_t i = 0; i < masks.size(); ++i) {
