@@ -1,5 +1,6 @@
 #include "firmware/pipeline/moving_stage.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
 

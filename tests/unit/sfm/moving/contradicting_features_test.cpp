@@ -59,7 +59,7 @@ TEST(ContradictingFeatures, AreNowhereWhenAllStandsStill) {
 TEST(ContradictingFeatures, AreNotOnConfirmedSurfaces) {
   test::MovingScene scene = test::make_moving_scene({});
   for (MovingView& view : scene.views) {
-    view.depth.setTo(4.0F);
+    view.depth.setTo(4.0);
   }
   EXPECT_EQ(find_in(scene).contradicting_on_board, 0U);
 }

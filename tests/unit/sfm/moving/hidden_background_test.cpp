@@ -36,7 +36,7 @@ TEST(HiddenBackground, IsNotSeenInChangedExposureAlone) {
   test::MovingScene scene =
       test::make_moving_scene({.plate = test::PlateKind::kNone, .exposure = 0.5});
   // Depth is missing in a field that shows the wall like everything else.
-  scene.views[2].depth(cv::Rect(100, 80, 100, 80)).setTo(0.0F);
+  scene.views[2].depth(cv::Rect(100, 80, 100, 80)).setTo(0.0);
   EXPECT_EQ(cv::countNonZero(find_hidden_background(scene.views, 2, {})), 0);
 }
 

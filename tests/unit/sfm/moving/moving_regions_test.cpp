@@ -80,8 +80,8 @@ TEST(MovingRegions, SwallowSpecksOfDepthButNotSurfaces) {
   const cv::Rect board = cv::boundingRect(scene.truth[1]);
   const cv::Rect speck(board.x, board.y + 30, 4, 4);  // at the border: no hole
   const cv::Rect surface(board.x + 20, board.y + 20, 30, 30);
-  scene.views[1].depth(speck).setTo(3.2F);
-  scene.views[1].depth(surface).setTo(3.2F);
+  scene.views[1].depth(speck).setTo(3.2);
+  scene.views[1].depth(surface).setTo(3.2);
   const cv::Mat mask = find_in(scene)[1];
   ASSERT_FALSE(mask.empty());
   EXPECT_EQ(cv::countNonZero(mask(speck)), speck.area());
