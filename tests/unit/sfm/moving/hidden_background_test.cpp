@@ -1,6 +1,7 @@
 #include "sfm/moving/hidden_background.hpp"
 
 #include <gtest/gtest.h>
+#include <opencv2/core.hpp>
 
 #include "tests/unit/sfm/moving/moving_scene.hpp"
 

@@ -1,5 +1,6 @@
 #include "sfm/moving/moving_keypoints.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 namespace trigmesh {
