@@ -240,6 +240,7 @@ class Gathering {
       }
     }
     std::vector<SurfaceGap> gaps;
+    gaps.reserve(by_root.size());
     for (auto& [root, gap] : by_root) {
       gaps.push_back(std::move(gap));
     }
