@@ -59,8 +59,8 @@ bool MeshVisibility::sees(const Eigen::Vector3d& point_in_world) const {
   }
   const int x = static_cast<int>(std::lround(pixel->x()));
   const int y = static_cast<int>(std::lround(pixel->y()));
-  const double nearest = inverse_depth_.at<float>(std::clamp(y, 0, camera_.height_px - 1),
-                                                  std::clamp(x, 0, camera_.width_px - 1));
+  const auto nearest = static_cast<double>(inverse_depth_.at<float>(
+      std::clamp(y, 0, camera_.height_px - 1), std::clamp(x, 0, camera_.width_px - 1)));
   // A step of s along the axis is s / depth * focal footprints of a pixel.
   return (nearest * pixel->z() - 1.0) * camera_.fx_px <= kSlackFootprints;
 }

@@ -49,7 +49,8 @@ std::uint32_t least_framing(std::span<const FaceShape> faces,
 }
 
 bool is_weak(const FaceCoverage& face) {
-  return face.seeing_views < kEnoughViews || double{face.parallax_rad} < kEnoughParallaxRad;
+  return face.seeing_views < kEnoughViews ||
+         static_cast<double>(face.parallax_rad) < kEnoughParallaxRad;
 }
 
 std::uint32_t framing_views(const Eigen::Vector3d& point, std::span<const DenseView> views) {

@@ -33,7 +33,7 @@ TEST(FaceCoverage, CountsViewsThatSeeAndParallax) {
   for (const FaceCoverage& face : measure_coverage(mesh, views, executor)) {
     EXPECT_EQ(face.framing_views, 5U);
     EXPECT_EQ(face.seeing_views, 3U);
-    EXPECT_NEAR(double{face.parallax_rad} / test::kRadPerDeg, 20.0, 0.5);
+    EXPECT_NEAR(static_cast<double>(face.parallax_rad) / test::kRadPerDeg, 20.0, 0.5);
   }
 }
 
