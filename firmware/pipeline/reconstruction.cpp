@@ -270,14 +270,12 @@ Result<PublishedModels> map_and_publish(const Run& run,
                                         const StageContext& context) {
   TM_ASSIGN_OR_RETURN(MappedPhotos mapped, map_features(run, input.features, input.pairs, context));
   run.stopwatch.finish(Stage::kMap);
-  const bool looks_for_movers =
-      run.options.build.moving != MovingUse::kOff && !mapped.components.empty();
-  const Scene first = looks_for_movers ? mapped.components.front() : Scene();
   TM_ASSIGN_OR_RETURN(PublishedModels published, publish(run, input, std::move(mapped), context));
-  if (!looks_for_movers) {
+  if (run.options.build.moving == MovingUse::kOff || published.components.empty()) {
     return published;
   }
-  TM_ASSIGN_OR_RETURN(auto still, map_what_stood_still(run, input, first, context));
+  TM_ASSIGN_OR_RETURN(auto still,
+                      map_what_stood_still(run, input, published.components.front(), context));
   return still ? publish(run, input, *std::move(still), context) : std::move(published);
 }
 

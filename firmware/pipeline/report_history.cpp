@@ -108,6 +108,19 @@ Result<> for_each_in(const Json& document, const char* name, const Parse& parse)
   return {};
 }
 
+/// What `parse` makes of each element of the array `name`, behind what is in `list`.
+template <typename T, typename Parse>
+Result<> read_list(const Json& document,
+                   const char* name,
+                   const Parse& parse,
+                   std::vector<T>& list) {
+  return for_each_in(document, name, [&](const Json& element) -> Result<> {
+    TM_ASSIGN_OR_RETURN(T value, parse(element));
+    list.push_back(std::move(value));
+    return {};
+  });
+}
+
 Result<ImageOutcome> parse_image(const Json& json) {
   ImageOutcome image;
   TM_ASSIGN_OR_RETURN(image.name, text_of(json, "name"));
@@ -223,16 +236,8 @@ Result<ScaleSection> parse_scale(const Json& json) {
   TM_ASSIGN_OR_RETURN(scale.outcome, one_of<ScaleOutcome>(json, "outcome", kScaleOutcomes));
   TM_ASSIGN_OR_RETURN(scale.metres_per_unit, number_of(json, "metres_per_mapping_unit"));
   TM_ASSIGN_OR_RETURN(scale.sd_ratio, number_of(json, "sd_ratio"));
-  TM_RETURN_IF_ERROR(for_each_in(json, "lengths", [&](const Json& element) -> Result<> {
-    TM_ASSIGN_OR_RETURN(LengthEvidence length, parse_length(element));
-    scale.lengths.push_back(std::move(length));
-    return {};
-  }));
-  TM_RETURN_IF_ERROR(for_each_in(json, "markers", [&](const Json& element) -> Result<> {
-    TM_ASSIGN_OR_RETURN(const MarkerSection marker, parse_marker(element));
-    scale.markers.push_back(marker);
-    return {};
-  }));
+  TM_RETURN_IF_ERROR(read_list(json, "lengths", parse_length, scale.lengths));
+  TM_RETURN_IF_ERROR(read_list(json, "markers", parse_marker, scale.markers));
   TM_ASSIGN_OR_RETURN(scale.problem, text_of(json, "problem"));
   TM_ASSIGN_OR_RETURN(const UpSource up, one_of<UpSource>(json, "up", kUpSources));
   scale.z_is_up = up == UpSource::kCard;
@@ -250,11 +255,7 @@ Result<FinishSection> parse_finish(const Json& json) {
   finish.ready = ready->get<bool>();
   TM_ASSIGN_OR_RETURN(finish.sentence, text_of(json, "sentence"));
   TM_ASSIGN_OR_RETURN(finish.gap_ratio, number_of(json, "gap_ratio"));
-  TM_RETURN_IF_ERROR(for_each_in(json, "gaps", [&](const Json& element) -> Result<> {
-    TM_ASSIGN_OR_RETURN(FinishGap gap, parse_gap(element));
-    finish.gaps.push_back(std::move(gap));
-    return {};
-  }));
+  TM_RETURN_IF_ERROR(read_list(json, "gaps", parse_gap, finish.gaps));
   return finish;
 }
 
@@ -283,35 +284,18 @@ Result<ReportHistory> parse_report_history(std::string_view json) {
   }
   ReportHistory history;
   TM_ASSIGN_OR_RETURN(history.input_description, text_of(document, "input"));
-  TM_RETURN_IF_ERROR(for_each_in(document, "images", [&](const Json& element) -> Result<> {
-    TM_ASSIGN_OR_RETURN(ImageOutcome image, parse_image(element));
-    history.images.push_back(std::move(image));
-    return {};
-  }));
+  TM_RETURN_IF_ERROR(read_list(document, "images", parse_image, history.images));
   if (document.contains("frames")) {  // the first reports had none
-    TM_RETURN_IF_ERROR(for_each_in(document, "frames", [&](const Json& element) -> Result<> {
-      TM_ASSIGN_OR_RETURN(VideoFrameSection frame, parse_frame(element));
-      history.frames.push_back(std::move(frame));
-      return {};
-    }));
+    TM_RETURN_IF_ERROR(read_list(document, "frames", parse_frame, history.frames));
   }
-  TM_RETURN_IF_ERROR(for_each_in(document, "pairs", [&](const Json& element) -> Result<> {
-    TM_ASSIGN_OR_RETURN(PairEvidence pair, parse_pair(element, history.images.size()));
-    history.pairs.push_back(pair);
-    return {};
-  }));
+  const auto parse_pair_of = [&](const Json& element) {
+    return parse_pair(element, history.images.size());
+  };
+  TM_RETURN_IF_ERROR(read_list(document, "pairs", parse_pair_of, history.pairs));
   if (document.contains("scale")) {  // where somebody knew a length
-    TM_RETURN_IF_ERROR(for_each_in(document, "scale", [&](const Json& element) -> Result<> {
-      TM_ASSIGN_OR_RETURN(ScaleSection scale, parse_scale(element));
-      history.scale.push_back(std::move(scale));
-      return {};
-    }));
+    TM_RETURN_IF_ERROR(read_list(document, "scale", parse_scale, history.scale));
   }
-  TM_RETURN_IF_ERROR(for_each_in(document, "settings", [&](const Json& element) -> Result<> {
-    TM_ASSIGN_OR_RETURN(ReportSetting setting, parse_setting(element));
-    history.settings.push_back(std::move(setting));
-    return {};
-  }));
+  TM_RETURN_IF_ERROR(read_list(document, "settings", parse_setting, history.settings));
   TM_RETURN_IF_ERROR(for_each_in(document, "cameras", [&](const Json& element) {
     return add_origin(element, history.intrinsics_origins);
   }));

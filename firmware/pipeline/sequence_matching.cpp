@@ -84,10 +84,7 @@ Result<std::span<const PairRecord>> SequenceMatcher::add(const ExtractedImage& i
     frames_.back().pairs = *std::move(stored);
     return frames_.back().pairs;
   }
-  while (in_chain_ < frame) {
-    TM_RETURN_IF_ERROR(enter_chain(in_chain_));
-    absorb(in_chain_ - 1);
-  }
+  TM_RETURN_IF_ERROR(absorb_until(frame));
   TM_RETURN_IF_ERROR(enter_chain(frame));
   compare(frame);
   TM_RETURN_IF_ERROR(
@@ -96,7 +93,11 @@ Result<std::span<const PairRecord>> SequenceMatcher::add(const ExtractedImage& i
 }
 
 Result<> SequenceMatcher::catch_up() {
-  while (in_chain_ < frames_.size()) {
+  return absorb_until(frames_.size());
+}
+
+Result<> SequenceMatcher::absorb_until(std::size_t end) {
+  while (in_chain_ < end) {
     TM_RETURN_IF_ERROR(enter_chain(in_chain_));
     absorb(in_chain_ - 1);
   }
@@ -240,11 +241,13 @@ void SequenceMatcher::add_to_chain(std::span<const PairRecord> pairs) {
 
 void SequenceMatcher::judge(std::span<PairRecord> pairs) const {
   for (PairRecord& record : pairs) {
+    if (!shows_one_scene(record.geometry.kind)) {
+      continue;
+    }
     const auto disagreement_deg = chain_.disagreement_deg(
         {frames_[index(record.pair.first)].in_chain, frames_[index(record.pair.second)].in_chain},
         record.geometry.inliers);
-    if (shows_one_scene(record.geometry.kind) && disagreement_deg &&
-        *disagreement_deg > options_.max_disagreement_deg) {
+    if (disagreement_deg && *disagreement_deg > options_.max_disagreement_deg) {
       record.geometry.kind = TwoViewKind::kLookAlike;
     }
   }

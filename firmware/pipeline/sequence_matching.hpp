@@ -94,6 +94,7 @@ class SequenceMatcher {
   [[nodiscard]] std::string checkpoint_name() const;
   [[nodiscard]] std::optional<std::vector<PairRecord>> stored_pairs() const;
   [[nodiscard]] Result<> enter_chain(std::size_t frame);
+  [[nodiscard]] Result<> absorb_until(std::size_t end);
   void absorb(std::size_t frame);
   void compare(std::size_t frame);
   [[nodiscard]] std::vector<PairRecord> match(std::span<const std::size_t> partners,

@@ -9,7 +9,6 @@
 #include "firmware/photos/photo_input.hpp"
 #include "firmware/photos/video_input.hpp"
 #include "firmware/pipeline/reconstruction.hpp"
-#include "sfm/exchange/camera_profile.hpp"
 #include "sfm/exchange/model_folder.hpp"
 #include "tools/trigmesh/command.hpp"
 #include "tools/trigmesh/reconstruct_run.hpp"
@@ -77,11 +76,7 @@ Result<ReconstructionOptions> options_from(const ReconstructArguments& arguments
   TM_ASSIGN_OR_RETURN(options.scale, scale_options_from(arguments.scale));
   options.software_version = TRIGMESH_VERSION;
   if (!arguments.camera_file.empty()) {
-    TM_ASSIGN_OR_RETURN(const std::vector<CameraProfile> profiles,
-                        read_camera_file(arguments.camera_file));
-    for (const CameraProfile& profile : profiles) {
-      options.cameras.push_back(profile.camera);
-    }
+    TM_ASSIGN_OR_RETURN(options.cameras, read_cameras(arguments.camera_file));
   }
   if (!arguments.poses.empty()) {
     TM_ASSIGN_OR_RETURN(options.poses, read_model(arguments.poses));

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "firmware/base/check.hpp"
+#include "sfm/exchange/camera_profile.hpp"
 #include "tools/trigmesh/interrupt.hpp"
 #include "tools/trigmesh/progress_printer.hpp"
 
@@ -52,6 +53,15 @@ Result<> check_scale(const ReconstructionReport& report, const std::string& outp
 }
 
 }  // namespace
+
+Result<std::vector<Camera>> read_cameras(const std::string& file) {
+  TM_ASSIGN_OR_RETURN(const std::vector<CameraProfile> profiles, read_camera_file(file));
+  std::vector<Camera> cameras;
+  for (const CameraProfile& profile : profiles) {
+    cameras.push_back(profile.camera);
+  }
+  return cameras;
+}
 
 Result<> run_reconstruction(const ReconstructRun& run) {
   const SteadyClock clock;

@@ -3,12 +3,16 @@
 #include <functional>
 #include <stop_token>
 #include <string>
+#include <vector>
 
 #include "firmware/base/result.hpp"
 #include "firmware/pipeline/photo_set.hpp"
 #include "firmware/pipeline/reconstruction.hpp"
 
 namespace trigmesh {
+
+/// The cameras of a profile of ours or a COLMAP cameras.txt. Errors: those of read_camera_file().
+[[nodiscard]] Result<std::vector<Camera>> read_cameras(const std::string& file);
 
 /// A reconstruction from the command line.
 struct ReconstructRun {

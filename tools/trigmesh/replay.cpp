@@ -1,8 +1,7 @@
 #include <algorithm>
 #include <filesystem>
-#include <map>
+#include <iterator>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,12 +14,8 @@
 #include "firmware/photos/pressed_frames.hpp"
 #include "firmware/photos/session_options.hpp"
 #include "firmware/pipeline/reconstruction.hpp"
-#include "sfm/exchange/camera_profile.hpp"
 #include "tools/trigmesh/command.hpp"
-#include "tools/trigmesh/interrupt.hpp"
-#include "tools/trigmesh/progress_printer.hpp"
 #include "tools/trigmesh/reconstruct_run.hpp"
-#include "tools/trigmesh/surface_arguments.hpp"
 
 namespace trigmesh {
 
@@ -39,7 +34,7 @@ byte, at any number of threads. Or a recording: a folder with images/ and timest
 rig would have chosen them, from the press in events.csv (if there is one) to its end.
 )";
 
-constexpr std::size_t kMaxModelFileBytes = std::size_t{4} << 30U;
+constexpr std::size_t kMaxComparedBytes = std::size_t{4} << 30U;
 
 struct ReplayArguments {
   std::string session;
@@ -65,11 +60,7 @@ Result<> apply(const ReplayArguments& arguments, ReconstructionOptions& options)
     options.num_threads = arguments.threads;
   }
   if (!arguments.camera_file.empty()) {
-    options.cameras.clear();
-    TM_ASSIGN_OR_RETURN(const auto profiles, read_camera_file(arguments.camera_file));
-    for (const CameraProfile& profile : profiles) {
-      options.cameras.push_back(profile.camera);
-    }
+    TM_ASSIGN_OR_RETURN(options.cameras, read_cameras(arguments.camera_file));
   }
   return {};
 }
@@ -130,8 +121,8 @@ Result<std::vector<std::string>> differences(const fs::path& a, const fs::path& 
                                 std::back_inserter(different));
   for (const std::string& name : names_a) {
     if (std::binary_search(names_b.begin(), names_b.end(), name)) {
-      TM_ASSIGN_OR_RETURN(const std::string bytes_a, read_file(a / name, kMaxModelFileBytes));
-      TM_ASSIGN_OR_RETURN(const std::string bytes_b, read_file(b / name, kMaxModelFileBytes));
+      TM_ASSIGN_OR_RETURN(const std::string bytes_a, read_file(a / name, kMaxComparedBytes));
+      TM_ASSIGN_OR_RETURN(const std::string bytes_b, read_file(b / name, kMaxComparedBytes));
       if (bytes_a != bytes_b) {
         different.push_back(name);
       }
