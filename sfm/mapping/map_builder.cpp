@@ -20,7 +20,10 @@ constexpr std::size_t kRankedBySpread = 8;
 constexpr double kRetryGrowth = 1.2;
 // While intrinsics are not known yet, poses may be this much worse.
 constexpr double kUnknownLensSlack = 2.0;
+constexpr int kToConvergence = 40;  // iterations of an adjustment of all
 constexpr int kFinalRounds = 3;
+// Rounds but the last go so far: what does not fit yet holds them up, and is dropped after them.
+constexpr int kRoundIterations = 4;
 // Final rounds end when less than this part of all observations changes.
 constexpr double kSettledRatio = 0.002;
 // Up to this many views every registration is followed by an adjustment of all.
@@ -73,7 +76,7 @@ bool MapBuilder::seed() {
   map_.register_view(found->pair.first, Rigid3{});
   map_.register_view(found->pair.second, found->second_from_first);
   (void)structure_.triangulate_all(map_);  // judged by the count below
-  adjustment().adjust_all(map_);
+  adjustment().adjust_all(map_, kToConvergence);
   structure_.filter(map_, kUnknownLensSlack * options_->max_reprojection_px);
   if (map_.landmark_count() < static_cast<std::size_t>(options_->min_seed_landmarks)) {
     return false;
@@ -209,11 +212,14 @@ void MapBuilder::finish() {
   for (int round = 0; round < kFinalRounds; ++round) {
     const std::size_t completed = strict.complete(map_);
     const std::size_t added = strict.triangulate_all(map_);
-    adjustment().adjust_all(map_);
+    const bool is_last = round + 1 == kFinalRounds;
+    const BundleReport adjusted =
+        adjustment().adjust_all(map_, is_last ? kToConvergence : kRoundIterations);
     const Structure::FilterReport filtered = strict.filter(map_, options_->final_reprojection_px);
     const std::size_t changed = filtered.removed_observations + completed + 2 * added;
-    if (static_cast<double>(changed) <
-        kSettledRatio * static_cast<double>(observation_count(map_))) {
+    if (adjusted.outcome == BundleOutcome::kConverged &&
+        static_cast<double>(changed) <
+            kSettledRatio * static_cast<double>(observation_count(map_))) {
       break;
     }
   }

@@ -13,7 +13,6 @@ constexpr std::size_t kLocalNeighbours = 5;
 constexpr std::size_t kMinSharedWithHeld = 10;
 constexpr int kLocalIterations = 8;
 constexpr int kSkeletonIterations = 12;
-constexpr int kFinalIterations = 40;
 // Relative decrease of the cost at which adjustment ends. Measured on Herz-Jesus-P25: from 1e-3 on,
 // smaller values move no camera by more than 0.02 mm and cost four times the iterations.
 constexpr double kQuickTolerance = 1e-3;
@@ -132,9 +131,9 @@ BundleReport ModelAdjustment::adjust_skeleton(Map& map) const {
   return adjust_bundle(map.scene_for_adjustment(), selection, options, *sigmas_px_, *executor_);
 }
 
-BundleReport ModelAdjustment::adjust_all(Map& map) const {
+BundleReport ModelAdjustment::adjust_all(Map& map, int max_iterations) const {
   BundleOptions options = bundle_options(map);
-  options.max_iterations = kFinalIterations;
+  options.max_iterations = max_iterations;
   options.function_tolerance = kQuickTolerance;
   return adjust_bundle(
       map.scene_for_adjustment(), select_everything(map.scene()), options, *sigmas_px_, *executor_);

@@ -28,8 +28,8 @@ class ModelAdjustment {
   /// All views, on the landmarks with the longest tracks (`landmarks_per_view`): fast, while the
   /// model grows.
   BundleReport adjust_skeleton(Map& map) const;
-  /// All views and all landmarks.
-  BundleReport adjust_all(Map& map) const;
+  /// All views and all landmarks, until it converges, with at most `max_iterations` (>= 1) steps.
+  BundleReport adjust_all(Map& map, int max_iterations) const;
 
  private:
   [[nodiscard]] BundleOptions bundle_options(const Map& map) const;

@@ -59,17 +59,13 @@ class SchurSolver {
 
   SolverSummary solve() {
     SolverSummary summary;
-    double cost = linearize();
+    double cost = evaluate();
     summary.initial_cost = cost;
     summary.outcome = BundleOutcome::kMaxIterations;
-    bool is_linearized = true;
     while (summary.iterations < options_.max_iterations) {
       ++summary.iterations;
-      if (!is_linearized) {
-        (void)linearize();
-      }
+      linearize();
       const Step step = try_step(cost);
-      is_linearized = false;
       if (step.accepted) {
         const double decrease = cost - step.cost;
         cost = step.cost;
@@ -129,7 +125,7 @@ class SchurSolver {
     }
   }
 
-  double linearize() {
+  void linearize() {
     executor_.for_each_index(ranges_.size(), [this](std::size_t piece) {
       sums_[piece].reset(layout_.block_count());
       eliminate_points(
@@ -139,7 +135,6 @@ class SchurSolver {
       sums_[0].add(sums_[piece]);
     }
     add_priors(sums_[0]);
-    return sums_[0].cost;
   }
 
   void add_priors(SchurSums& sums) const {
@@ -147,9 +142,7 @@ class SchurSolver {
       const std::size_t block = layout_.camera_block(term.camera) + term.parameter / kBlock;
       const std::size_t at = term.parameter % kBlock;
       const double inverse = 1.0 / term.prior.sigma;
-      const double residual = prior_residual(term);
-      sums.cost += 0.5 * residual * residual;
-      sums.gradient[kBlock * block + at] += residual * inverse;
+      sums.gradient[kBlock * block + at] += prior_residual(term) * inverse;
       sums.diagonal[kBlock * block + at] += inverse * inverse;
       sums.blocks[36 * (block * (block + 1) / 2 + block) + (kBlock + 1) * at] += inverse * inverse;
     }
@@ -292,7 +285,7 @@ class SchurSolver {
                                                                problem_.points[observation.point],
                                                                observation,
                                                                {});
-        costs[piece] += 0.5 * evaluate_loss(options_, residual.squaredNorm()).rho;
+        costs[piece] += 0.5 * loss_of(options_, residual.squaredNorm());
       }
     });
     double cost = 0.0;
@@ -334,7 +327,7 @@ class SchurSolver {
   SchurLayout layout_;
   std::vector<std::pair<std::size_t, std::size_t>> ranges_;  // of points
   std::vector<PriorTerm> priors_;
-  std::vector<SchurSums> sums_;  // by range; the first holds the total after `linearize`
+  std::vector<SchurSums> sums_;  // by range; the first holds the total after linearize()
   SchurPoints eliminated_;
   Eigen::MatrixXd reduced_;
   Eigen::VectorXd camera_step_;

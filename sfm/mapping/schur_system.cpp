@@ -190,9 +190,7 @@ class PointEliminator {
     if (camera_moves) {
       split_camera_rows(camera_rows.data(), camera.block_size(), row_);
     }
-    const LossValue loss = evaluate_loss(options_, row_.residual.squaredNorm());
-    sums_.cost += 0.5 * loss.rho;
-    scale(std::sqrt(loss.weight), camera_moves);
+    scale(std::sqrt(loss_weight(options_, row_.residual.squaredNorm())), camera_moves);
   }
 
   void scale(double factor, bool camera_moves) {
@@ -374,7 +372,6 @@ void SchurSums::reset(std::size_t block_count) {
   gradient.assign(kBlock * block_count, 0.0);
   reduction.assign(kBlock * block_count, 0.0);
   diagonal.assign(kBlock * block_count, 0.0);
-  cost = 0.0;
 }
 
 void SchurSums::add(const SchurSums& other) {
@@ -387,28 +384,36 @@ void SchurSums::add(const SchurSums& other) {
   add_vector(other.gradient, gradient);
   add_vector(other.reduction, reduction);
   add_vector(other.diagonal, diagonal);
-  cost += other.cost;
 }
 
-LossValue evaluate_loss(const BundleOptions& options, double s) {
+double loss_of(const BundleOptions& options, double s) {
   const double b = options.loss_scale_px * options.loss_scale_px;
   switch (options.loss) {
     case RobustLoss::kNone:
       break;
     case RobustLoss::kHuber:
-      if (s > b) {
-        const double r = std::sqrt(s);
-        return {2.0 * options.loss_scale_px * r - b, options.loss_scale_px / r};
-      }
-      break;
-    case RobustLoss::kSoftL1: {
-      const double t = std::sqrt(1.0 + s / b);
-      return {2.0 * b * (t - 1.0), 1.0 / t};
-    }
+      return s > b ? 2.0 * options.loss_scale_px * std::sqrt(s) - b : s;
+    case RobustLoss::kSoftL1:
+      return 2.0 * b * (std::sqrt(1.0 + s / b) - 1.0);
     case RobustLoss::kCauchy:
-      return {b * std::log1p(s / b), 1.0 / (1.0 + s / b)};
+      return b * std::log1p(s / b);
   }
-  return {s, 1.0};
+  return s;
+}
+
+double loss_weight(const BundleOptions& options, double s) {
+  const double b = options.loss_scale_px * options.loss_scale_px;
+  switch (options.loss) {
+    case RobustLoss::kNone:
+      break;
+    case RobustLoss::kHuber:
+      return s > b ? options.loss_scale_px / std::sqrt(s) : 1.0;
+    case RobustLoss::kSoftL1:
+      return 1.0 / std::sqrt(1.0 + s / b);
+    case RobustLoss::kCauchy:
+      return 1.0 / (1.0 + s / b);
+  }
+  return 1.0;
 }
 
 void eliminate_points(const BundleProblem& problem,

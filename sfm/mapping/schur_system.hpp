@@ -92,7 +92,6 @@ struct SchurSums {
   std::vector<double> gradient;   ///< gc
   std::vector<double> reduction;  ///< sum_j Z_j L_j^-1 gp_j
   std::vector<double> diagonal;   ///< Du
-  double cost = 0.0;
 
   void reset(std::size_t block_count);
   void add(const SchurSums& other);
@@ -117,13 +116,11 @@ struct SchurPoints {
   std::vector<SchurEntry> entries;
 };
 
-/// rho(s) and its derivative, s the squared length of a residual.
-struct LossValue {
-  double rho = 0.0;
-  double weight = 1.0;
-};
+/// rho(s), s the squared length of a residual.
+[[nodiscard]] double loss_of(const BundleOptions& options, double s);
 
-[[nodiscard]] LossValue evaluate_loss(const BundleOptions& options, double s);
+/// Its derivative rho'(s).
+[[nodiscard]] double loss_weight(const BundleOptions& options, double s);
 
 /// Linearises and eliminates the points [first, last) and adds them to `sums`.
 void eliminate_points(const BundleProblem& problem,

@@ -101,17 +101,26 @@ double reprojection_error_px(const Map& map, LandmarkId landmark, const Observat
 
 double largest_triangulation_angle(const Map& map, LandmarkId landmark) {
   const Landmark& point = map.landmark(landmark);
-  double largest = 0.0;
-  for (std::size_t i = 0; i < point.track.size(); ++i) {
-    const Eigen::Vector3d center = camera_center(map.pose(point.track[i].view));
-    for (std::size_t j = i + 1; j < point.track.size(); ++j) {
-      largest = std::max(
-          largest,
-          triangulation_angle(
-              center, camera_center(map.pose(point.track[j].view)), point.position_in_world));
+  std::vector<Eigen::Vector3d> rays;
+  rays.reserve(point.track.size());
+  for (const Observation& observation : point.track) {
+    rays.push_back(
+        (camera_center(map.pose(observation.view)) - point.position_in_world).normalized());
+  }
+  double least_cosine = 1.0;
+  std::pair<std::size_t, std::size_t> widest(0, 0);
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    for (std::size_t j = i + 1; j < rays.size(); ++j) {
+      if (const double cosine = rays[i].dot(rays[j]); cosine < least_cosine) {
+        least_cosine = cosine;
+        widest = {i, j};
+      }
     }
   }
-  return largest;
+  if (rays.empty()) {
+    return 0.0;
+  }
+  return triangulation_angle(rays[widest.first], rays[widest.second], Eigen::Vector3d::Zero());
 }
 
 std::size_t Structure::triangulate(Map& map, std::span<const TrackId> tracks) const {
