@@ -123,11 +123,25 @@ void Rig::press(const Press& press) {
     }
   }
   close_reason_ = "a press of the button";
+  is_pressed_ = true;
+  continued_id_ = continued_by_press(press.time);
   advance(press, press.time);
+  continued_id_.clear();
+  is_pressed_ = false;
   if (takes_stills && press.kind != PressKind::kDown && press.kind != PressKind::kUp) {
     const bool has_two = press.kind == PressKind::kDouble;
     (void)parts_.capture.push(ForgetPresses{has_two ? last_down_ : press.time});
   }
+}
+
+std::string Rig::continued_by_press(nanoseconds time) const {
+  const bool is_soon = time - finished_time_ < options_.continue_within;
+  return is_soon && !state_.session_open ? finished_id_ : std::string();
+}
+
+void Rig::session_finished(const std::string& id) {
+  finished_id_ = id;
+  finished_time_ = parts_.clock.now();
 }
 
 void Rig::hear(CameraChanged& input) {
@@ -284,6 +298,7 @@ void Rig::hear(ModelAnswer& input) {
   if (!is_stopped) {
     last_outcome_ =
         input.outcome == ModelOutcome::kReady ? LastOutcome::kDone : LastOutcome::kFailed;
+    session_finished(input.session_id);
   }
   RigEvent event = JobDone{};
   if (is_failed) {
@@ -384,7 +399,7 @@ void Rig::act(const OpenSession& /*action*/) {
   session_id_.clear();
   guide_.begin();
   told_advice_ = Advice::kNone;
-  parts_.storage.push(OpenSessionOrder{serial_, continued_id_});
+  parts_.storage.push(OpenSessionOrder{serial_, continued_id_, is_pressed_});
   (void)parts_.capture.push(HoldCamera{serial_});
   for (const EdgeRecord& edge : std::exchange(recent_edges_, {})) {
     if (edge.kernel_time >= event_time_) {  // of the press that began it
@@ -418,6 +433,9 @@ void Rig::act(const UndoLastFrame& /*action*/) {
 }
 
 void Rig::act(const CloseSession& /*action*/) {
+  if (!options_.rig.makes_models) {
+    session_finished(session_id_);
+  }
   end_session(SessionEnd::kKeep, close_reason_);
 }
 

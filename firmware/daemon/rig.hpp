@@ -30,6 +30,8 @@ struct RigLoopOptions {
   PressOptions presses;
   /// How late an edge may be heard of: the settling time of the contact, and a little. >= 0.
   std::chrono::nanoseconds edge_delay = std::chrono::milliseconds(50);
+  /// A press so soon after a model is ready adds to its session; 0: each begins a new one. >= 0.
+  std::chrono::nanoseconds continue_within{};
 };
 
 /// What the loop works with; all of it outlives it.
@@ -80,6 +82,8 @@ class Rig {
   void continue_session(Command& command);
   void cancel_model(Command& command);
   void press(const Press& press);
+  /// The session that a press at `time` adds to; empty: none.
+  [[nodiscard]] std::string continued_by_press(std::chrono::nanoseconds time) const;
   void presses_by_time();
   /// One step of the state machine and its actions. `time`: of what caused it.
   void advance(const RigEvent& event, std::chrono::nanoseconds time);
@@ -98,6 +102,7 @@ class Rig {
   void act(const EndProgram& action);
 
   void end_session(SessionEnd end, std::string why);
+  void session_finished(const std::string& id);
   void fail_commands(const Error& error);
   void answer(CommandAnswer& command, Result<> result);
   void give_answers();
@@ -123,8 +128,11 @@ class Rig {
   SessionSerial serial_{};  ///< of the session that was opened last
   std::string session_id_;  ///< empty until it is open
   std::uint64_t next_ticket_ = 1;
-  std::string continued_id_;    ///< of the session that is opened next; empty: a new one
-  CommandAnswer asking_;        ///< of the command whose step is being done
+  std::string continued_id_;  ///< of the session that is opened next; empty: a new one
+  bool is_pressed_ = false;   ///< it is a press whose step is being done
+  std::string finished_id_;   ///< of the session that was finished last; empty: none
+  std::chrono::nanoseconds finished_time_{};
+  CommandAnswer asking_;  ///< of the command whose step is being done
   bool asks_to_start_ = false;  ///< that command waits until the session is open
   CommandAnswer on_opened_;
   std::map<StillTicket, CommandAnswer> on_still_;

@@ -49,6 +49,7 @@ RigLoopOptions rig_options(const Settings& settings) {
   options.presses.long_press = settings.trigger.long_press;
   options.presses.double_press = settings.trigger.double_press;
   options.edge_delay = settings.trigger.debounce + milliseconds(20);
+  options.continue_within = capture.continue_within;
   return options;
 }
 

@@ -137,14 +137,11 @@ void Storage::do_order(OpenSessionOrder order) {
     return;
   }
   drops_at_begin_ = parts_.drops.now();
-  const Result<std::string> id = order.continued_id.empty()
-                                     ? store_.begin_session()
-                                     : check_unused(order.continued_id).and_then([&] {
-                                         return store_.continue_session(order.continued_id);
-                                       });
+  const Result<std::string> id = open_session(order);
   if (!id) {
     (void)parts_.rig.push(SessionLost{order.serial, id.error()});
-    const bool names_a_session = !order.continued_id.empty();  // which may simply not be there
+    // A session that has to be that one may simply not be there.
+    const bool names_a_session = !order.continued_id.empty() && !order.or_a_new_one;
     if (is_about_disk(id.error()) && !names_a_session) {
       disk_failed(id.error());
     } else {
@@ -156,6 +153,22 @@ void Storage::do_order(OpenSessionOrder order) {
   tell_capture_began();
   (void)parts_.rig.push(SessionOpened{
       order.serial, *id, static_cast<std::uint32_t>(store_.session().frames().size())});
+}
+
+Result<std::string> Storage::open_session(const OpenSessionOrder& order) {
+  if (order.continued_id.empty()) {
+    return store_.begin_session();
+  }
+  Result<std::string> id = check_unused(order.continued_id).and_then([&] {
+    return store_.continue_session(order.continued_id);
+  });
+  if (id || !order.or_a_new_one) {
+    return id;
+  }
+  write_log(LogLevel::kWarn,
+            fmt::format("a new session begins instead: {}", id.error().message),
+            {{"session", order.continued_id}});
+  return store_.begin_session();
 }
 
 void Storage::do_order(RecordOrder order) {

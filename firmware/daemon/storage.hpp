@@ -55,6 +55,7 @@ class Storage {
   void disk_failed(const Error& error);
 
   void do_order(OpenSessionOrder order);
+  [[nodiscard]] Result<std::string> open_session(const OpenSessionOrder& order);
   void do_order(RecordOrder order);
   void do_order(StreamFrameOrder order);
   void do_order(StillFrameOrder order);

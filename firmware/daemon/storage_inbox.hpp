@@ -25,6 +25,7 @@ namespace trigmesh {
 struct OpenSessionOrder {
   SessionSerial serial{};
   std::string continued_id{};  ///< a closed session that is continued; empty: a new one
+  bool or_a_new_one = false;   ///< where that cannot be continued: a press is not lost
 };
 
 /// Into the journal of the open session; when none is open it is left out.

@@ -74,6 +74,7 @@ struct CaptureSettings {
   VideoTrigger video_trigger = VideoTrigger::kHold;
   int every_nth_sharp_frame = 0;
   std::chrono::milliseconds still_wait{2000};
+  std::chrono::seconds continue_within{0};
   int queue_frames = 8;
   int jpeg_quality = 95;
 

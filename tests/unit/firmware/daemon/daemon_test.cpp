@@ -131,6 +131,63 @@ TEST_F(Video, AClosedSessionIsContinuedAndItsModelMadeAnew) {
   EXPECT_EQ(std::count(news.begin(), news.end(), "frame 1"), 2) << "also the earlier ones";
 }
 
+TEST_F(Video, APressSoonAfterTheModelAddsToItsSession) {
+  options_.rig.continue_within = std::chrono::hours(1);
+  start_daemon();
+  await("camera", "true");
+  press_and_release();
+  await("frame", "\"frames\":2}");
+  press_and_release();
+  await("phase", "working");
+  const std::string id = sessions()[0].manifest.id;
+  models_.finish(ModelOutcome::kReady);
+  await("phase", "idle");
+  const std::uint32_t before = sessions()[0].manifest.frame_count;
+  press_and_release();
+  await("phase", "capturing");
+  await_that([&] { return status().frames > before; });
+  EXPECT_EQ(status().session_id, id);
+  press_and_release();
+  await("phase", "working");
+  ASSERT_EQ(sessions().size(), 1U);
+  EXPECT_THAT(models_.begun(), ElementsAre(id, id));
+}
+
+TEST_F(Video, APressWhileTheModelIsMadeOrLaterBeginsAnotherSession) {
+  options_.rig.continue_within = std::chrono::hours(1);
+  start_daemon();
+  await("camera", "true");
+  press_and_release();
+  await("frame");
+  press_and_release();
+  await("phase", "working");
+  press_and_release();
+  await("frame");
+  EXPECT_EQ(sessions().size(), 2U);
+  press_and_release();
+  await("phase", "working");
+}
+
+TEST_F(Video, APressOnASessionThatIsGoneBeginsANewOne) {
+  options_.rig.continue_within = std::chrono::hours(1);
+  start_daemon();
+  await("camera", "true");
+  press_and_release();
+  await("frame");
+  press_and_release();
+  await("phase", "working");
+  const std::string id = sessions()[0].manifest.id;
+  models_.finish(ModelOutcome::kReady);
+  await("phase", "idle");
+  ASSERT_TRUE(control().remove_session(id));
+  press_and_release();
+  await("frame");
+  EXPECT_NE(status().session_id, id);
+  EXPECT_EQ(sessions().size(), 1U);
+  press_and_release();
+  await("phase", "working");
+}
+
 TEST_F(Video, OnlyASessionThatIsThereIsContinued) {
   start_daemon();
   await("camera", "true");
