@@ -280,9 +280,7 @@ std::size_t KeyframeSelector::choose_keyframe() const {
   }
   for (std::size_t i = 0; i < stretch_.size(); ++i) {
     const FrameMeasures& measures = stretch_[i].measures;
-    const bool is_early = keyframe_time_.has_value() &&
-                          stretch_[i].timestamp - *keyframe_time_ < options_.min_interval;
-    if (measures.motion_deg >= options_.slow_motion_deg && !is_early &&
+    if (measures.motion_deg >= options_.slow_motion_deg &&
         measures.sharpness > stretch_[best].measures.sharpness) {
       best = i;
     }

@@ -41,7 +41,7 @@ struct KeyframeOptions {
   /// When even the sharpest frame of a stretch is one of the blurriest of late, sharper ones are
   /// looked for so long before it and after it. >= 0.
   std::chrono::milliseconds patience{300};
-  /// Keyframes follow each other no quicker than this. >= 0.
+  /// Keyframes follow each other no quicker than this, unless only blurrier frames follow. >= 0.
   std::chrono::milliseconds min_interval{60};
   /// Less sharp than this share of what is usual of late: blurred. [0, 1).
   double min_relative_sharpness = 0.4;
