@@ -37,6 +37,17 @@ std::string scale_sentence(const ReconstructionReport& report) {
   return fmt::format(" It has no scale: {}.", report.scale.front().problem);
 }
 
+/// Whether more is to be shot, and from where the largest gap.
+std::string finish_sentence(const ReconstructionReport& report) {
+  if (!report.finish) {
+    return {};
+  }
+  const std::vector<FinishGap>& gaps = report.finish->gaps;
+  return fmt::format(" {}{}",
+                     report.finish->sentence,
+                     gaps.empty() ? "" : fmt::format(" The largest: {}.", gaps.front().advice));
+}
+
 ModelOutcome outcome_of(const Error& error) {
   switch (error.code) {
     case ErrorCode::kCancelled:
@@ -63,7 +74,8 @@ ModelAnswer answer_of(const SessionManifest& manifest,
   ModelAnswer answer{manifest.id, ModelOutcome::kReady, {}};
   if (made) {
     answer.outcome = made->report.components.empty() ? ModelOutcome::kNone : ModelOutcome::kReady;
-    answer.message = made->report.verdict_sentence + scale_sentence(made->report);
+    answer.message = made->report.verdict_sentence + scale_sentence(made->report) +
+                     finish_sentence(made->report);
     return answer;
   }
   answer.outcome = outcome_of(made.error());

@@ -132,7 +132,7 @@ class Rig {
   bool is_pressed_ = false;   ///< it is a press whose step is being done
   std::string finished_id_;   ///< of the session that was finished last; empty: none
   std::chrono::nanoseconds finished_time_{};
-  CommandAnswer asking_;  ///< of the command whose step is being done
+  CommandAnswer asking_;        ///< of the command whose step is being done
   bool asks_to_start_ = false;  ///< that command waits until the session is open
   CommandAnswer on_opened_;
   std::map<StillTicket, CommandAnswer> on_still_;

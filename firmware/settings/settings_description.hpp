@@ -125,11 +125,12 @@ void visit_capture(CaptureSettings& s, Visitor& v) {
           {0, 1000});
   v.time(
       {"still_wait_ms", "ms", "How long a press waits for its frame"}, s.still_wait, {50, 60'000});
-  v.time({"continue_within_s",
-          "s",
-          "A press so soon after a model is ready adds to its scan; 0: each press begins a new one"},
-         s.continue_within,
-         {0, 86'400});
+  v.time(
+      {"continue_within_s",
+       "s",
+       "A press so soon after a model is ready adds to its scan; 0: each press begins a new one"},
+      s.continue_within,
+      {0, 86'400});
   v.whole(
       {"queue_frames", "frames", "Frames between camera and storage; when full the oldest goes"},
       s.queue_frames,

@@ -25,6 +25,7 @@ namespace fs = std::filesystem;
 using test_support::demo_camera_profile;
 using test_support::demo_pictures;
 using test_support::DemoStore;
+using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
 
 /// Five pictures, enough for a model.
@@ -107,6 +108,8 @@ TEST(ModelWorker, MakesTheModelOfASession) {
   const ModelAnswer answer = work.make(store.open(id));
   EXPECT_EQ(answer.session_id, id);
   EXPECT_EQ(answer.outcome, ModelOutcome::kReady) << answer.message;
+  EXPECT_THAT(answer.message, ContainsRegex("eady: .* of the surface|Ready: the surface"))
+      << "whether more is to be shot";
   EXPECT_GT(work.worker().progress_count(), 100U);
   const Session session = store.open(id);
   EXPECT_EQ(session.manifest().state, SessionState::kModelReady);
@@ -118,7 +121,7 @@ TEST(ModelWorker, MakesTheModelOfASession) {
   EXPECT_FALSE(fs::exists(session.staged_model()));
 }
 
-TEST(ModelWorker, MakesAModelInMetresOffTheMarkersOfTheSettings) {
+TEST(ModelWorkerSlow, MakesAModelInMetresOffTheMarkersOfTheSettings) {
   DemoStore store;
   ScaleSettings scale;
   scale.marker_side_m = 0.1;
@@ -134,7 +137,7 @@ TEST(ModelWorker, MakesAModelInMetresOffTheMarkersOfTheSettings) {
   EXPECT_THAT(told.message, HasSubstr("It has no scale: the known lengths disagree"));
 }
 
-TEST(ModelWorker, GivesTheSameBytesAfterAStopInAnyStage) {
+TEST(ModelWorkerSlow, GivesTheSameBytesAfterAStopInAnyStage) {
   DemoStore store;
   const auto pictures = few_pictures();
   const std::string whole = store.add(pictures, demo_camera_profile());
