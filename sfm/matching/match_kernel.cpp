@@ -14,7 +14,12 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "sfm/matching/match_kernel.cpp"
 // SVE vectors cannot be kept in arrays; such machines run the NEON code.
-#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
+#define TRIGMESH_SVE (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
+#ifdef TRIGMESH_FEW_SIMD_TARGETS  // sanitizer builds: one of each width
+#define HWY_DISABLED_TARGETS (TRIGMESH_SVE | HWY_SSSE3 | HWY_SSE4 | HWY_AVX3)
+#else
+#define HWY_DISABLED_TARGETS TRIGMESH_SVE
+#endif
 #define HWY_WANT_AVX3_DL
 #include "sfm/matching/match_kernel.hpp"
 

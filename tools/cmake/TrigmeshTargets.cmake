@@ -23,22 +23,38 @@ if(TRIGMESH_SANITIZE)
   target_compile_options(trigmesh_compile_options INTERFACE -fsanitize=${TRIGMESH_SANITIZE} -fno-omit-frame-pointer
                                                             -fno-sanitize-recover=all)
   target_link_options(trigmesh_compile_options INTERFACE -fsanitize=${TRIGMESH_SANITIZE})
-  # Half of the build would be checks for undefined behaviour inside Eigen's templates; memory is watched there too.
+  # Half of the build would be checks for undefined behaviour inside Eigen's templates; memory is watched there too. What the checks
+  # of null pointers, sizes of objects and types find, the address sanitizer finds as well. They, and all checks for undefined
+  # behaviour in the tests themselves, would be a sixth of compiling.
   if(CMAKE_CXX_COMPILER_ID STREQUAL Clang)
+    target_compile_options(trigmesh_compile_options INTERFACE -fno-sanitize=null,object-size,vptr
+      $<$<BOOL:$<TARGET_PROPERTY:TRIGMESH_IS_TEST>>:-fno-sanitize=undefined>)
     target_compile_options(trigmesh_compile_options INTERFACE
       "-fsanitize-ignorelist=${CMAKE_CURRENT_LIST_DIR}/sanitizer_ignorelist.txt")
   endif()
 endif()
 
-# Sanitizer builds compile all libraries once more, with what most of their files include parsed once. The release build does
-# without it, so that a missing include is found.
-if(TRIGMESH_SANITIZE)
-  file(CONFIGURE OUTPUT "${CMAKE_BINARY_DIR}/generated/precompiled.cpp" CONTENT "// A target needs one source.\n")
-  add_library(trigmesh_library_headers OBJECT "${CMAKE_BINARY_DIR}/generated/precompiled.cpp")
-  target_link_libraries(trigmesh_library_headers PRIVATE Eigen3::Eigen fmt::fmt opencv_core tl::expected trigmesh_compile_options)
-  target_precompile_headers(
-    trigmesh_library_headers
-    PRIVATE
+# Sanitizer builds compile several files of a target as one: half the time. Files with a
+# name that a neighbour has too stay apart.
+include(separate_sources)
+
+# trigmesh_join_sources(TARGET SOURCES..)
+function(trigmesh_join_sources target)
+  if(NOT TRIGMESH_SANITIZE)
+    return()
+  endif()
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ON)
+  foreach(source IN LISTS ARGN)
+    cmake_path(RELATIVE_PATH CMAKE_CURRENT_SOURCE_DIR BASE_DIRECTORY "${CMAKE_SOURCE_DIR}" OUTPUT_VARIABLE folder)
+    if("${folder}/${source}" IN_LIST separate_sources)
+      set_source_files_properties("${source}" PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+    endif()
+  endforeach()
+endfunction()
+
+# What most files include is parsed once a build. With TRIGMESH_PRECOMPILE=OFF (tools/dev/check-trixie) a missing include is found.
+if(TRIGMESH_PRECOMPILE)
+  set(common_headers
     <Eigen/Core>
     <Eigen/Geometry>
     <Eigen/LU>
@@ -56,7 +72,22 @@ if(TRIGMESH_SANITIZE)
     <thread>
     <variant>
     <vector>)
+  file(CONFIGURE OUTPUT "${CMAKE_BINARY_DIR}/generated/precompiled.cpp" CONTENT "// A target needs one source.\n")
+  add_library(trigmesh_library_headers OBJECT "${CMAKE_BINARY_DIR}/generated/precompiled.cpp")
+  add_library(trigmesh_program_headers OBJECT "${CMAKE_BINARY_DIR}/generated/precompiled.cpp")
+  foreach(target trigmesh_library_headers trigmesh_program_headers)
+    target_link_libraries(${target} PRIVATE Eigen3::Eigen fmt::fmt opencv_core tl::expected trigmesh_compile_options)
+  endforeach()
+  target_precompile_headers(trigmesh_library_headers PRIVATE ${common_headers})
+  target_precompile_headers(trigmesh_program_headers PRIVATE ${common_headers} <CLI/CLI.hpp> <nlohmann/json.hpp>)
 endif()
+
+# trigmesh_precompile(TARGET library|program): with what such targets include parsed once
+function(trigmesh_precompile target kind)
+  if(TRIGMESH_PRECOMPILE)
+    target_precompile_headers(${target} REUSE_FROM trigmesh_${kind}_headers)
+  endif()
+endfunction()
 
 # trigmesh_add_library(NAME sfm_camera SOURCES .. HEADERS .. PUBLIC .. PRIVATE ..)
 # One folder, one target trigmesh_<NAME>. A folder of headers only becomes an INTERFACE library.
@@ -65,12 +96,11 @@ function(trigmesh_add_library)
   set(target trigmesh_${ARG_NAME})
   if(ARG_SOURCES)
     add_library(${target} STATIC ${ARG_SOURCES})
+    trigmesh_join_sources(${target} ${ARG_SOURCES})
     target_sources(${target} PUBLIC FILE_SET HEADERS BASE_DIRS "${CMAKE_SOURCE_DIR}" FILES ${ARG_HEADERS})
     target_link_libraries(${target} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE} trigmesh_compile_options)
     target_include_directories(${target} PUBLIC "${CMAKE_SOURCE_DIR}")
-    if(TRIGMESH_SANITIZE)
-      target_precompile_headers(${target} REUSE_FROM trigmesh_library_headers)
-    endif()
+    trigmesh_precompile(${target} library)
   else()
     add_library(${target} INTERFACE)
     target_sources(${target} INTERFACE FILE_SET HEADERS BASE_DIRS "${CMAKE_SOURCE_DIR}" FILES ${ARG_HEADERS})
@@ -84,12 +114,17 @@ set(thread_folders
   "${CMAKE_SOURCE_DIR}/tests/conformance"
   "${CMAKE_SOURCE_DIR}/tests/unit/drivers/camera"
   "${CMAKE_SOURCE_DIR}/tests/unit/drivers/trigger"
-  "${CMAKE_SOURCE_DIR}/tests/unit/firmware")
+  "${CMAKE_SOURCE_DIR}/tests/unit/firmware/base"
+  "${CMAKE_SOURCE_DIR}/tests/unit/firmware/daemon"
+  "${CMAKE_SOURCE_DIR}/tests/unit/firmware/pipeline")
 set(test_prefix "")
+set(test_environment "")
 if(TRIGMESH_SANITIZE MATCHES "address")
   set(test_prefix "asan.")
 elseif(TRIGMESH_SANITIZE MATCHES "thread")
   set(test_prefix "tsan.")
+  # A program with threads would wait a second at its end for reports of others.
+  set(test_environment ENVIRONMENT "TSAN_OPTIONS=atexit_sleep_ms=50")
 endif()
 
 # What tools/run-tests builds with sanitizers: parts of the tests only.
@@ -98,7 +133,8 @@ add_custom_target(trigmesh_thread_tests)
 add_custom_target(trigmesh_fuzzers)
 
 # trigmesh_add_test(NAME unit_sfm_camera SOURCES .. LIBRARIES .. LABEL unit [TIMEOUT 60])
-# A GoogleTest program; every TEST in it becomes a ctest entry with the label and time-out.
+# A GoogleTest program; every TEST in it becomes a ctest entry with the label and time-out. Suites whose name ends in Slow are left
+# out under sanitizers.
 function(trigmesh_add_test)
   cmake_parse_arguments(ARG "" "NAME;LABEL;TIMEOUT" "SOURCES;LIBRARIES" ${ARGN})
   if(NOT TRIGMESH_BUILD_TESTS)
@@ -108,7 +144,9 @@ function(trigmesh_add_test)
     set(ARG_TIMEOUT 60)
   endif()
   add_executable(${ARG_NAME} ${ARG_SOURCES})
+  trigmesh_join_sources(${ARG_NAME} ${ARG_SOURCES})
   target_link_libraries(${ARG_NAME} PRIVATE ${ARG_LIBRARIES} trigmesh_tests_framework)
+  set_target_properties(${ARG_NAME} PROPERTIES TRIGMESH_IS_TEST ON)
   target_precompile_headers(${ARG_NAME} REUSE_FROM trigmesh_tests_headers)
   if("${ARG_LABEL}" MATCHES "^(unit|conformance)$")
     add_dependencies(trigmesh_unit_tests ${ARG_NAME})
@@ -119,8 +157,12 @@ function(trigmesh_add_test)
       endif()
     endforeach()
   endif()
-  gtest_discover_tests(${ARG_NAME} DISCOVERY_MODE PRE_TEST TEST_PREFIX "${test_prefix}"
-                       PROPERTIES LABELS "${ARG_LABEL}" TIMEOUT ${ARG_TIMEOUT})
+  set(filter "")
+  if(TRIGMESH_SANITIZE)
+    set(filter TEST_FILTER "-*Slow.*")
+  endif()
+  gtest_discover_tests(${ARG_NAME} DISCOVERY_MODE PRE_TEST TEST_PREFIX "${test_prefix}" ${filter}
+                       PROPERTIES LABELS "${ARG_LABEL}" TIMEOUT ${ARG_TIMEOUT} ${test_environment})
 endfunction()
 
 # trigmesh_add_benchmark(NAME bench_matching SOURCES .. LIBRARIES ..)

@@ -1,0 +1,40 @@
+# Sources that sanitizer builds compile each on its own (TrigmeshTargets.cmake): a name inside of them is also one of a neighbour's.
+# Where compiling fails with "redefinition of", the name is worth looking at - it may be a twin - or the file is added here. Files that
+# Highway includes once for every instruction set can only be apart.
+set(separate_sources
+  drivers/camera/libcamera/libcamera_source.cpp
+  drivers/camera/v4l2/v4l2_source.cpp
+  firmware/control/control_json.cpp
+  firmware/control/control_server.cpp
+  firmware/daemon/rig.cpp
+  firmware/daemon/trigger_reader.cpp
+  firmware/imaging/grey_reducer.cpp
+  firmware/pipeline/report_history.cpp
+  firmware/session/session.cpp
+  firmware/session/store.cpp
+  sfm/calibration/charuco.cpp
+  sfm/exchange/colmap_text.cpp
+  sfm/exchange/ply_points.cpp
+  sfm/features/sift_describe.cpp
+  sfm/features/sift_rows.cpp
+  sfm/geometry/p3p.cpp
+  sfm/mapping/schur_system.cpp
+  sfm/mapping/structure.cpp
+  sfm/matching/line_kernel.cpp
+  sfm/matching/match_kernel.cpp
+  sfm/moving/moving_keypoints.cpp
+  sfm/surface/mesh_repair.cpp
+  sfm/texture/color_outliers.cpp
+  sfm/texture/view_gains.cpp
+  tests/unit/drivers/trigger/debouncer_test.cpp
+  tests/unit/drivers/trigger/scripted/event_table_test.cpp
+  tests/unit/firmware/daemon/models/model_worker_test.cpp
+  tests/unit/firmware/pipeline/report_json_test.cpp
+  tests/unit/firmware/pipeline/video_frames_test.cpp
+  tests/unit/sfm/calibration/edge_shift_test.cpp
+  tests/unit/sfm/exchange/obj_test.cpp
+  tests/unit/sfm/exchange/ply_mesh_test.cpp
+  tests/unit/sfm/exchange/ply_test.cpp
+  tests/unit/sfm/geometry/relative_pose_test.cpp
+  tests/unit/sfm/matching/pair_matching_test.cpp
+  tests/unit/sfm/moving/moving_regions_test.cpp)
