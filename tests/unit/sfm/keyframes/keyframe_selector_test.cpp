@@ -18,6 +18,7 @@ using ::testing::Not;
 
 constexpr int kWidth = 320;
 constexpr int kHeight = 240;
+constexpr std::uint64_t kSwing = 6;  // frames
 
 /// A long wall along which the camera walks.
 const cv::Mat& wall() {
@@ -32,9 +33,9 @@ cv::Mat view_at(double x_px) {
   return view;
 }
 
-cv::Mat blurred(const cv::Mat& image) {
+cv::Mat blurred(const cv::Mat& image, double sigma_px = 3.0) {
   cv::Mat result;
-  cv::GaussianBlur(image, result, {}, 3.0);
+  cv::GaussianBlur(image, result, {}, sigma_px);
   return result;
 }
 
@@ -46,6 +47,30 @@ class KeyframeSelectorTest : public ::testing::Test {
   }
 
   void finish() { take(selector_.finish()); }
+
+  /// A steady walk with a swing, in which pictures are a little blurred.
+  void walk_with_swing_at(std::uint64_t first) {
+    double x_px = 0.0;
+    for (std::uint64_t i = 0; i < first + 40; ++i) {
+      const bool is_swing = i >= first && i < first + kSwing;
+      offer(is_swing ? blurred(view_at(x_px), 0.7) : view_at(x_px));
+      x_px += is_swing ? 22.0 : 3.0;
+    }
+    finish();
+  }
+
+  /// Frames before `end` since the last keyframe that had moved.
+  [[nodiscard]] std::vector<std::uint64_t> passed_over(std::uint64_t keyframe,
+                                                       std::uint64_t end) const {
+    std::vector<std::uint64_t> passed;
+    for (std::uint64_t id = keyframe - 1; decisions_.at(id).verdict != FrameVerdict::kKept; --id) {
+      const double motion_deg = decisions_.at(id).measures.motion_deg;
+      if (id < end && motion_deg >= KeyframeOptions{}.slow_motion_deg) {
+        passed.push_back(id);
+      }
+    }
+    return passed;
+  }
 
   void take(const std::vector<FrameDecision>& decisions) {
     for (const FrameDecision& decision : decisions) {
@@ -111,6 +136,22 @@ TEST_F(KeyframeSelectorTest, AvoidsBlurredFrames) {
   const auto kept = frames_with(FrameVerdict::kKept);
   EXPECT_THAT(kept, Not(IsEmpty()));
   EXPECT_THAT(kept, Each(::testing::ResultOf([](std::uint64_t id) { return id % 3; }, 0U)));
+}
+
+TEST_F(KeyframeSelectorTest, PassesOverNoSharpFrameForABlurredOne) {
+  std::size_t blurred_keyframes = 0;
+  for (std::uint64_t first = 62; first < 66; ++first) {
+    decisions_.clear();
+    next_id_ = 0;
+    walk_with_swing_at(first);
+    for (const std::uint64_t id : frames_with(FrameVerdict::kKept)) {
+      if (id >= first && id < first + kSwing) {
+        ++blurred_keyframes;
+        EXPECT_THAT(passed_over(id, first), IsEmpty()) << "swing from " << first << ", kept " << id;
+      }
+    }
+  }
+  EXPECT_GT(blurred_keyframes, 0U);
 }
 
 TEST_F(KeyframeSelectorTest, LeavesOutAFlash) {
