@@ -13,6 +13,9 @@ namespace trigmesh {
 
 namespace {
 
+/// Keyframes of a walk that are compared while the chain map follows as many before them.
+constexpr std::size_t kWalkBlock = 16;
+
 constexpr const char* kCheckpoint = "pairs";
 
 std::uint64_t key_of(const std::vector<ExtractedImage>& images,
@@ -147,18 +150,21 @@ Result<std::vector<PairRecord>> match_walk(const std::vector<ExtractedImage>& im
                                            const StageContext& context) {
   TM_ASSIGN_OR_RETURN(auto matcher,
                       SequenceMatcher::create(options, context.executor, context.checkpoints));
-  StageProgress progress(context, Stage::kMatch, images.size());
-  std::vector<PairRecord> pairs;
+  std::vector<SequenceKeyframe> keyframes;
   for (std::size_t i = 0; i < images.size(); ++i) {
+    const CameraId camera = cameras.group_of_image[i];
+    keyframes.push_back({&images[i], cameras.groups[index(camera)], camera});
+  }
+  StageProgress progress(context, Stage::kMatch, images.size());
+  for (std::size_t begin = 0; begin < keyframes.size(); begin += kWalkBlock) {
     if (context.stop.stop_requested()) {
       return fail(ErrorCode::kCancelled, "stopped while matching; finished keyframes are kept");
     }
-    const CameraId camera = cameras.group_of_image[i];
-    TM_ASSIGN_OR_RETURN(const auto found,
-                        matcher.add(images[i], cameras.groups[index(camera)], camera));
-    pairs.insert(pairs.end(), found.begin(), found.end());
-    progress.advance();
+    const std::size_t count = std::min(kWalkBlock, keyframes.size() - begin);
+    TM_RETURN_IF_ERROR(matcher.add_block(std::span(keyframes).subspan(begin, count),
+                                         [&progress] { progress.advance(); }));
   }
+  TM_ASSIGN_OR_RETURN(std::vector<PairRecord> pairs, matcher.all_pairs());
   std::sort(pairs.begin(), pairs.end(), [](const PairRecord& a, const PairRecord& b) {
     return a.pair < b.pair;
   });

@@ -46,6 +46,10 @@ std::uint64_t key_of(const ExtractedImage& image,
   return content_hash(image.features->features.descriptors, content_hash(text, before));
 }
 
+std::string checkpoint_name(std::size_t frame) {
+  return fmt::format("sequence-{:06}", frame);
+}
+
 }  // namespace
 
 SequenceMatchingOptions walk_matching_options(const ReconstructionOptions& options) {
@@ -58,50 +62,81 @@ SequenceMatchingOptions walk_matching_options(const ReconstructionOptions& optio
 Result<SequenceMatcher> SequenceMatcher::create(const SequenceMatchingOptions& options,
                                                 Executor& executor,
                                                 const CheckpointFolder& checkpoints) {
-  TM_ASSIGN_OR_RETURN(Mapper chain, Mapper::create(options.mapper, executor));
-  return SequenceMatcher(options, executor, checkpoints, std::move(chain));
+  auto chain_executor = std::make_unique<SerialExecutor>();
+  TM_ASSIGN_OR_RETURN(Mapper chain, Mapper::create(options.mapper, *chain_executor));
+  return SequenceMatcher(
+      options, executor, checkpoints, std::move(chain_executor), std::move(chain));
 }
 
 SequenceMatcher::SequenceMatcher(const SequenceMatchingOptions& options,
                                  Executor& executor,
                                  const CheckpointFolder& checkpoints,
+                                 std::unique_ptr<Executor> chain_executor,
                                  Mapper chain)
     : options_(options),
       executor_(&executor),
       checkpoints_(&checkpoints),
       key_(key_of(options)),
+      chain_executor_(std::move(chain_executor)),
       chain_(std::move(chain)) {
   matching_.verification.seed = static_cast<int>(options.mapper.seed & 0x7fffffffU);
 }
 
-Result<std::span<const PairRecord>> SequenceMatcher::add(const ExtractedImage& image,
-                                                         const CameraGroup& group,
-                                                         CameraId camera) {
-  key_ = key_of(image, group, camera, key_);
-  frames_.push_back({&image, group, camera, {}});
+Result<std::span<const PairRecord>> SequenceMatcher::add(const SequenceKeyframe& keyframe) {
+  enter(keyframe);
   const std::size_t frame = frames_.size() - 1;
-  if (auto stored = stored_pairs()) {
-    frames_.back().pairs = *std::move(stored);
-    return frames_.back().pairs;
+  if (!frames_[frame].is_judged) {
+    TM_RETURN_IF_ERROR(prepare());
+    TM_RETURN_IF_ERROR(follow_until(frame));
+    compare(frame, *executor_);
+    TM_RETURN_IF_ERROR(follow_until(frame + 1));
   }
-  TM_RETURN_IF_ERROR(absorb_until(frame));
-  TM_RETURN_IF_ERROR(enter_chain(frame));
-  compare(frame);
-  TM_RETURN_IF_ERROR(
-      checkpoints_->save(checkpoint_name(), key_, encode_pairs(frames_.back().pairs)));
-  return frames_.back().pairs;
+  return frames_[frame].pairs;
+}
+
+Result<> SequenceMatcher::add_block(std::span<const SequenceKeyframe> keyframes,
+                                    const std::function<void()>& compared) {
+  const std::size_t begin = frames_.size();
+  std::vector<std::size_t> missing;
+  for (const SequenceKeyframe& keyframe : keyframes) {
+    enter(keyframe);
+    if (frames_.back().is_judged) {
+      compared();
+    } else {
+      missing.push_back(frames_.size() - 1);
+    }
+  }
+  if (missing.empty()) {
+    return {};
+  }
+  TM_RETURN_IF_ERROR(prepare());
+  Result<> followed;
+  executor_->for_each_index(missing.size() + 1, [&](std::size_t i) {
+    if (i == 0) {
+      followed = follow_until(begin);
+      return;
+    }
+    SerialExecutor serial;
+    compare(missing[i - 1], serial);
+    compared();
+  });
+  return followed;
+}
+
+Result<std::vector<PairRecord>> SequenceMatcher::all_pairs() {
+  const auto last =
+      std::find_if(frames_.rbegin(), frames_.rend(), [](const Frame& f) { return !f.is_judged; });
+  TM_RETURN_IF_ERROR(follow_until(static_cast<std::size_t>(frames_.rend() - last)));
+  std::vector<PairRecord> pairs;
+  for (const Frame& frame : frames_) {
+    pairs.insert(pairs.end(), frame.pairs.begin(), frame.pairs.end());
+  }
+  return pairs;
 }
 
 Result<> SequenceMatcher::catch_up() {
-  return absorb_until(frames_.size());
-}
-
-Result<> SequenceMatcher::absorb_until(std::size_t end) {
-  while (in_chain_ < end) {
-    TM_RETURN_IF_ERROR(enter_chain(in_chain_));
-    absorb(in_chain_ - 1);
-  }
-  return {};
+  TM_RETURN_IF_ERROR(prepare());
+  return follow_until(frames_.size());
 }
 
 SequenceFollowing SequenceMatcher::following() const {
@@ -109,75 +144,123 @@ SequenceFollowing SequenceMatcher::following() const {
   if (chain_.registered_count() == 0) {
     return SequenceFollowing::kWaiting;
   }
-  const Keyframe& last = frames_.back();
+  const Frame& last = frames_.back();
   return last.matchable && chain_.is_registered(last.in_chain) ? SequenceFollowing::kTracked
                                                                : SequenceFollowing::kLost;
 }
 
-std::string SequenceMatcher::checkpoint_name() const {
-  return fmt::format("sequence-{:06}", frames_.size() - 1);
+void SequenceMatcher::enter(const SequenceKeyframe& keyframe) {
+  key_ = key_of(*keyframe.image, keyframe.group, keyframe.camera, key_);
+  frames_.push_back({keyframe, key_});
+  frames_.back().is_judged = load(frames_.size() - 1);
 }
 
-std::optional<std::vector<PairRecord>> SequenceMatcher::stored_pairs() const {
-  const auto payload = checkpoints_->load(checkpoint_name(), key_);
+/// What an earlier run found of the keyframe; false: nothing.
+bool SequenceMatcher::load(std::size_t frame) {
+  const auto payload = checkpoints_->load(checkpoint_name(frame), frames_[frame].key);
   if (!payload) {
-    return std::nullopt;
+    return false;
   }
   auto decoded = decode_pairs(*payload);
-  return decoded ? std::optional(*std::move(decoded)) : std::nullopt;
+  if (decoded) {
+    frames_[frame].pairs = *std::move(decoded);
+  }
+  return decoded.has_value();
 }
 
-/// The next keyframe into the chain map, without any pair.
-Result<> SequenceMatcher::enter_chain(std::size_t frame) {
-  Keyframe& keyframe = frames_[frame];
-  ++in_chain_;
-  if (!keyframe.image->features) {
-    return {};
+/// All keyframes so far can be compared.
+Result<> SequenceMatcher::prepare() {
+  std::vector<Result<>> prepared(frames_.size() - prepared_);
+  executor_->for_each_index(prepared.size(), [&](std::size_t i) {
+    Frame& frame = frames_[prepared_ + i];
+    if (!frame.keyframe.image->features) {
+      return;
+    }
+    auto matchable = matchable_image(*frame.keyframe.image->features, frame.keyframe.group);
+    if (matchable) {
+      frame.matchable = *std::move(matchable);
+    } else {
+      prepared[i] = tl::unexpected<Error>(matchable.error());
+    }
+  });
+  for (const Result<>& one : prepared) {
+    TM_RETURN_IF_ERROR(one);
   }
-  TM_ASSIGN_OR_RETURN(keyframe.matchable,
-                      matchable_image(*keyframe.image->features, keyframe.group));
-  if (index(keyframe.camera) == cameras_in_chain_) {
-    chain_.add_camera(keyframe.group.camera, keyframe.group.knowledge);
-    ++cameras_in_chain_;
-  }
-  keyframe.in_chain =
-      chain_.add_image({{}, keyframe.camera, keyframe.image->features->features.keypoints});
+  prepared_ = frames_.size();
   return {};
 }
 
-/// What is known of a keyframe does to the chain map what it did when it was found.
-void SequenceMatcher::absorb(std::size_t frame) {
+/// Finds its pairs; nothing of it depends on the chain map.
+void SequenceMatcher::compare(std::size_t frame, Executor& executor) {
   const std::vector<std::size_t> near = neighbours_of(frame);
-  std::vector<PairRecord>& pairs = frames_[frame].pairs;
-  const auto first_near = std::find_if(pairs.begin(), pairs.end(), [&](const PairRecord& record) {
-    return !near.empty() && index(record.pair.first) >= near.front();
-  });
-  add_to_chain(std::span(first_near, pairs.end()));
-  add_to_chain(std::span(pairs.begin(), first_near));
-  grow(frame);
-}
-
-void SequenceMatcher::compare(std::size_t frame) {
-  const std::vector<std::size_t> near = neighbours_of(frame);
-  const std::vector<PairRecord> near_pairs = match(near, frame);
-  add_to_chain(near_pairs);
-  std::vector<PairRecord>& pairs = frames_[frame].pairs;
-  pairs = match(look_alikes_of(frame, near.empty() ? 0 : near.front()), frame);
-  judge(pairs);
-  add_to_chain(pairs);
-  pairs.insert(pairs.end(), near_pairs.begin(), near_pairs.end());
-  grow(frame);
+  frames_[frame].near = match(near, frame, executor);
+  frames_[frame].far =
+      match(look_alikes_of(frame, near.empty() ? 0 : near.front(), executor), frame, executor);
 }
 
 std::vector<PairRecord> SequenceMatcher::match(std::span<const std::size_t> partners,
-                                               std::size_t frame) const {
+                                               std::size_t frame,
+                                               Executor& executor) const {
   std::vector<PairRecord> pairs(partners.size());
-  executor_->for_each_index(partners.size(), [&](std::size_t i) {
+  executor.for_each_index(partners.size(), [&](std::size_t i) {
     pairs[i] = {{id_of<ViewId>(partners[i]), id_of<ViewId>(frame)},
                 match_pair(*frames_[partners[i]].matchable, *frames_[frame].matchable, matching_)};
   });
   std::erase_if(pairs, [](const PairRecord& record) { return record.geometry.candidates == 0; });
   return pairs;
+}
+
+Result<> SequenceMatcher::follow_until(std::size_t end) {
+  while (in_chain_ < end) {
+    TM_RETURN_IF_ERROR(follow(in_chain_));
+  }
+  return {};
+}
+
+/// The next keyframe into the chain map, which judges its far pairs where no earlier run did.
+Result<> SequenceMatcher::follow(std::size_t number) {
+  Frame& frame = frames_[number];
+  enter_chain(frame);
+  if (frame.is_judged) {
+    const std::span<const PairRecord> pairs = frame.pairs;
+    const std::size_t far_count = far_count_of(number);
+    add_to_chain(pairs.subspan(far_count));
+    add_to_chain(pairs.first(far_count));
+    grow(frame);
+    return {};
+  }
+  add_to_chain(frame.near);
+  judge(frame.far);
+  add_to_chain(frame.far);
+  grow(frame);
+  frame.pairs = std::exchange(frame.far, {});
+  frame.pairs.insert(frame.pairs.end(), frame.near.begin(), frame.near.end());
+  frame.near = {};
+  frame.is_judged = true;
+  return checkpoints_->save(checkpoint_name(number), frame.key, encode_pairs(frame.pairs));
+}
+
+/// How many of its pairs come before those with its neighbours.
+std::size_t SequenceMatcher::far_count_of(std::size_t frame) const {
+  const std::vector<std::size_t> near = neighbours_of(frame);
+  const std::vector<PairRecord>& pairs = frames_[frame].pairs;
+  const auto first_near = std::find_if(pairs.begin(), pairs.end(), [&](const PairRecord& record) {
+    return !near.empty() && index(record.pair.first) >= near.front();
+  });
+  return static_cast<std::size_t>(first_near - pairs.begin());
+}
+
+void SequenceMatcher::enter_chain(Frame& frame) {
+  ++in_chain_;
+  if (!frame.matchable) {
+    return;
+  }
+  const auto& [image, group, camera] = frame.keyframe;
+  if (index(camera) == cameras_in_chain_) {
+    chain_.add_camera(group.camera, group.knowledge);
+    ++cameras_in_chain_;
+  }
+  frame.in_chain = chain_.add_image({{}, camera, image->features->features.keypoints});
 }
 
 /// The readable keyframes just before it, ascending.
@@ -195,9 +278,11 @@ std::vector<std::size_t> SequenceMatcher::neighbours_of(std::size_t frame) const
 /// Of the keyframes before `end`, those of which most coarse features match (preemptive matching:
 /// Wu, Towards linear-time incremental structure from motion, 3DV 2013, section 3), some places
 /// apart from each other, ascending.
-std::vector<std::size_t> SequenceMatcher::look_alikes_of(std::size_t frame, std::size_t end) const {
+std::vector<std::size_t> SequenceMatcher::look_alikes_of(std::size_t frame,
+                                                         std::size_t end,
+                                                         Executor& executor) const {
   std::vector<std::pair<std::size_t, std::size_t>> ranked(end);  // (matches, keyframe)
-  executor_->for_each_index(end, [&](std::size_t i) {
+  executor.for_each_index(end, [&](std::size_t i) {
     ranked[i] = {0, i};
     if (frames_[i].matchable) {
       ranked[i].first = match_descriptors(frames_[i].matchable->index,
@@ -254,20 +339,19 @@ void SequenceMatcher::judge(std::span<PairRecord> pairs) const {
 }
 
 /// Begins a chain map, and refines those that are, when keyframes wait in vain.
-void SequenceMatcher::grow(std::size_t frame) {
-  const Keyframe& keyframe = frames_[frame];
-  if (!keyframe.matchable || chain_.is_registered(keyframe.in_chain)) {
+void SequenceMatcher::grow(const Frame& frame) {
+  if (!frame.matchable || chain_.is_registered(frame.in_chain)) {
     return;
   }
   ++without_pose_;
   const bool is_first = chain_.registered_count() == 0;
-  const bool is_known = keyframe.group.knowledge != IntrinsicsKnowledge::kUnknown;
+  const bool is_known = frame.keyframe.group.knowledge != IntrinsicsKnowledge::kUnknown;
   if (without_pose_ < (is_first && !is_known ? kFirstMapOfUnknownLens : kFirstMap)) {
     return;
   }
   while (chain_.step().kind != StepKind::kNothing) {
   }
-  without_pose_ = chain_.is_registered(keyframe.in_chain) ? 0 : without_pose_ - kNextTry;
+  without_pose_ = chain_.is_registered(frame.in_chain) ? 0 : without_pose_ - kNextTry;
 }
 
 }  // namespace trigmesh

@@ -2,9 +2,10 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <optional>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "firmware/base/executor.hpp"
@@ -45,6 +46,14 @@ enum class SequenceFollowing {
   kLost,     ///< there is a map, but the keyframe does not fit it, or has no features
 };
 
+/// A keyframe of a walk. `camera` is its group among those of the keyframes so far, in the order of
+/// their first keyframes.
+struct SequenceKeyframe {
+  const ExtractedImage* image = nullptr;  ///< outlives the matcher
+  CameraGroup group;
+  CameraId camera{};
+};
+
 /// Compares each keyframe of a walk with those before it, as it comes: its neighbours in time, and
 /// earlier ones that look alike, which close loops. A chain map grows from the neighbours; a loop
 /// that contradicts it is a look-alike place and counts for nothing (TwoViewKind::kLookAlike: the
@@ -58,12 +67,19 @@ class SequenceMatcher {
                                                       Executor& executor,
                                                       const CheckpointFolder& checkpoints);
 
-  /// The next keyframe; `image` outlives the matcher. `camera` is its group among those of the
-  /// keyframes so far, in the order of their first keyframes. Returns its pairs with earlier ones,
-  /// those without any candidate left out, first ascending. kIo, kNoSpace of the checkpoints.
-  [[nodiscard]] Result<std::span<const PairRecord>> add(const ExtractedImage& image,
-                                                        const CameraGroup& group,
-                                                        CameraId camera);
+  /// The next keyframe. Returns its pairs with earlier ones, those without any candidate left out,
+  /// first ascending. kIo, kNoSpace of the checkpoints; kInvalidArgument: features that cannot be
+  /// compared.
+  [[nodiscard]] Result<std::span<const PairRecord>> add(const SequenceKeyframe& keyframe);
+
+  /// The next keyframes, when they are all there: compared with each other and with earlier ones
+  /// while the chain map follows the earlier ones. `compared` is called for each, on any thread.
+  /// Their pairs are known after all_pairs(). Errors as above.
+  [[nodiscard]] Result<> add_block(std::span<const SequenceKeyframe> keyframes,
+                                   const std::function<void()>& compared);
+
+  /// Of all keyframes so far, in their order. Errors as above.
+  [[nodiscard]] Result<std::vector<PairRecord>> all_pairs();
 
   /// Puts what came from checkpoints into the chain map. kInvalidArgument: features that cannot be
   /// compared.
@@ -77,43 +93,54 @@ class SequenceMatcher {
   [[nodiscard]] std::size_t tracked_count() const { return chain_.registered_count(); }
 
  private:
-  struct Keyframe {
-    const ExtractedImage* image = nullptr;
-    CameraGroup group;
-    CameraId camera{};
-    std::vector<PairRecord> pairs;
-    std::optional<MatchableImage> matchable{};  ///< once it is in the chain map
+  struct Frame {
+    SequenceKeyframe keyframe;
+    std::uint64_t key = 0;                      ///< of it and all before it
+    std::optional<MatchableImage> matchable{};  ///< once something is compared with it
+    std::vector<PairRecord> near{};             ///< with its neighbours in time, until it is judged
+    std::vector<PairRecord> far{};              ///< with places that look alike, likewise
+    bool is_judged = false;                     ///< by the chain map, now or in an earlier run
+    std::vector<PairRecord> pairs{};            ///< once it is judged: far ones, near ones
     ViewId in_chain{};
   };
 
   SequenceMatcher(const SequenceMatchingOptions& options,
                   Executor& executor,
                   const CheckpointFolder& checkpoints,
+                  std::unique_ptr<Executor> chain_executor,
                   Mapper chain);
 
-  [[nodiscard]] std::string checkpoint_name() const;
-  [[nodiscard]] std::optional<std::vector<PairRecord>> stored_pairs() const;
-  [[nodiscard]] Result<> enter_chain(std::size_t frame);
-  [[nodiscard]] Result<> absorb_until(std::size_t end);
-  void absorb(std::size_t frame);
-  void compare(std::size_t frame);
+  void enter(const SequenceKeyframe& keyframe);
+  [[nodiscard]] bool load(std::size_t frame);
+  [[nodiscard]] Result<> prepare();
+  void compare(std::size_t frame, Executor& executor);
   [[nodiscard]] std::vector<PairRecord> match(std::span<const std::size_t> partners,
-                                              std::size_t frame) const;
+                                              std::size_t frame,
+                                              Executor& executor) const;
   [[nodiscard]] std::vector<std::size_t> neighbours_of(std::size_t frame) const;
-  [[nodiscard]] std::vector<std::size_t> look_alikes_of(std::size_t frame, std::size_t end) const;
+  [[nodiscard]] std::vector<std::size_t> look_alikes_of(std::size_t frame,
+                                                        std::size_t end,
+                                                        Executor& executor) const;
+  [[nodiscard]] Result<> follow_until(std::size_t end);
+  [[nodiscard]] Result<> follow(std::size_t number);
+  [[nodiscard]] std::size_t far_count_of(std::size_t frame) const;
+  void enter_chain(Frame& frame);
   void add_to_chain(std::span<const PairRecord> pairs);
   void judge(std::span<PairRecord> pairs) const;
-  void grow(std::size_t frame);
+  void grow(const Frame& frame);
 
   SequenceMatchingOptions options_;
   PairMatchingOptions matching_;
   Executor* executor_;
   const CheckpointFolder* checkpoints_;
   std::uint64_t key_;  ///< of all keyframes so far
-  std::vector<Keyframe> frames_;
+  std::vector<Frame> frames_;
+  std::size_t prepared_ = 0;  ///< keyframes that something can be compared with
   std::size_t in_chain_ = 0;  ///< keyframes that the chain map has been told of
   std::size_t cameras_in_chain_ = 0;
   std::size_t without_pose_ = 0;  ///< keyframes, since the chain map was last grown
+  /// One thread: the others compare meanwhile.
+  std::unique_ptr<Executor> chain_executor_;
   Mapper chain_;
 };
 

@@ -62,7 +62,7 @@ Result<WalkState> WalkFollower::follow(std::size_t photo) {
   TM_ASSIGN_OR_RETURN(const CameraGroups cameras, groups_so_far());
   const CameraId camera = cameras.group_of_image.back();
   const CameraGroup group = images_.back().features ? cameras.groups[index(camera)] : CameraGroup{};
-  TM_ASSIGN_OR_RETURN(const auto pairs, matcher_->add(images_.back(), group, camera));
+  TM_ASSIGN_OR_RETURN(const auto pairs, matcher_->add({&images_.back(), group, camera}));
   TM_RETURN_IF_ERROR(matcher_->catch_up());
   const bool closes_loop = std::any_of(pairs.begin(), pairs.end(), [](const PairRecord& record) {
     return shows_one_scene(record.geometry.kind) &&

@@ -95,7 +95,7 @@ class SchurSolver {
   /// Pieces of points with about equally many observations; their number depends on nothing but the
   /// problem, so that sums are formed in the same order whatever executes them.
   void split_points() {
-    constexpr std::size_t kObservationsPerPiece = 4096;
+    constexpr std::size_t kObservationsPerPiece = 2048;
     constexpr std::size_t kMaxPieces = 4;
     const std::size_t all = problem_.observations.size();
     const std::size_t pieces = std::clamp<std::size_t>(all / kObservationsPerPiece, 1, kMaxPieces);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <string>
@@ -141,7 +142,7 @@ class SequenceMatching : public ::testing::Test {
     auto matcher = SequenceMatcher::create({}, executor, checkpoints);
     PairsOfFrames pairs;
     for (const ExtractedImage& image : images) {
-      const auto found = matcher->add(image, kGiven, CameraId{0});
+      const auto found = matcher->add({&image, kGiven, CameraId{0}});
       EXPECT_TRUE(found) << found.error().message;
       pairs.push_back(encode_pairs({found->begin(), found->end()}));
     }
@@ -221,6 +222,42 @@ TEST_F(SequenceMatching, GoesOnFromCheckpointsToTheSameBytesOnMoreThreads) {
   EXPECT_EQ(match(images, pool, *checkpoints), whole);
   EXPECT_EQ(match(images, pool, *checkpoints), whole);  // all of it from checkpoints
   EXPECT_EQ(tracked_, images.size());
+}
+
+/// All keyframes at hand: pairs of blocks of them.
+std::vector<std::uint8_t> match_in_blocks(const std::vector<ExtractedImage>& images,
+                                          Executor& executor,
+                                          const CheckpointFolder& checkpoints) {
+  constexpr std::size_t kBlock = 7;
+  std::vector<SequenceKeyframe> keyframes;
+  for (const ExtractedImage& image : images) {
+    keyframes.push_back({&image, kGiven, CameraId{0}});
+  }
+  auto matcher = SequenceMatcher::create({}, executor, checkpoints);
+  std::atomic<std::size_t> compared = 0;
+  for (std::size_t begin = 0; begin < keyframes.size(); begin += kBlock) {
+    const std::size_t count = std::min(kBlock, keyframes.size() - begin);
+    EXPECT_TRUE(matcher->add_block(std::span(keyframes).subspan(begin, count),
+                                   [&compared] { ++compared; }));
+  }
+  EXPECT_EQ(compared, images.size());
+  return encode_pairs(*matcher->all_pairs());
+}
+
+TEST_F(SequenceMatching, BlocksGiveTheSameBytesAsOneByOneAlsoFromCheckpoints) {
+  auto images = walk_along(Wall(/*period_m=*/8.0), steps(0.0, 12.0));
+  images.insert(images.begin() + 20,
+                ExtractedImage{std::nullopt, {ErrorCode::kCorruptData, "torn"}});
+  const std::vector<std::uint8_t> expected = encode_pairs(all_of(match(images)));
+  const TemporaryFolder folder;
+  const auto checkpoints = CheckpointFolder::open(folder.path());
+  WorkerPool pool(3);
+  auto first_part = images;
+  first_part.resize(24);
+  (void)match_in_blocks(first_part, pool, *checkpoints);
+  EXPECT_EQ(match_in_blocks(images, pool, *checkpoints), expected);
+  EXPECT_EQ(match_in_blocks(images, pool, *checkpoints), expected) << "all of it from checkpoints";
+  EXPECT_EQ(encode_pairs(all_of(match(images, pool, *checkpoints))), expected);
 }
 
 TEST_F(SequenceMatching, ACheckpointOfAnotherPastIsNotUsed) {
