@@ -17,7 +17,19 @@ using std::chrono::nanoseconds;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-class Video : public test_support::RigUnderTest {};
+class Video : public test_support::RigUnderTest {
+ protected:
+  /// From the start to a session of some frames whose model is being made.
+  std::string capture_first_session() {
+    start_daemon();
+    await("camera", "true");
+    press_and_release();
+    await("frame", "\"frames\":2}");
+    press_and_release();
+    await("phase", "working");
+    return sessions()[0].manifest.id;
+  }
+};
 
 TEST_F(Video, APressBeginsASessionAndTheNextClosesIt) {
   start_daemon();
@@ -107,13 +119,7 @@ TEST_F(Video, AdviceFollowsTheMapAndIsShownAndWrittenDown) {
 }
 
 TEST_F(Video, AClosedSessionIsContinuedAndItsModelMadeAnew) {
-  start_daemon();
-  await("camera", "true");
-  press_and_release();
-  await("frame", "\"frames\":2}");
-  press_and_release();
-  await("phase", "working");
-  const std::string id = sessions()[0].manifest.id;
+  const std::string id = capture_first_session();
   EXPECT_EQ(control().continue_session(id).error().code, ErrorCode::kInsufficientData)
       << "its model is being made";
   models_.finish(ModelOutcome::kReady);
@@ -133,13 +139,7 @@ TEST_F(Video, AClosedSessionIsContinuedAndItsModelMadeAnew) {
 
 TEST_F(Video, APressSoonAfterTheModelAddsToItsSession) {
   options_.rig.continue_within = std::chrono::hours(1);
-  start_daemon();
-  await("camera", "true");
-  press_and_release();
-  await("frame", "\"frames\":2}");
-  press_and_release();
-  await("phase", "working");
-  const std::string id = sessions()[0].manifest.id;
+  const std::string id = capture_first_session();
   models_.finish(ModelOutcome::kReady);
   await("phase", "idle");
   const std::uint32_t before = sessions()[0].manifest.frame_count;
@@ -153,14 +153,9 @@ TEST_F(Video, APressSoonAfterTheModelAddsToItsSession) {
   EXPECT_THAT(models_.begun(), ElementsAre(id, id));
 }
 
-TEST_F(Video, APressWhileTheModelIsMadeOrLaterBeginsAnotherSession) {
+TEST_F(Video, APressWhileTheModelIsMadeBeginsAnotherSession) {
   options_.rig.continue_within = std::chrono::hours(1);
-  start_daemon();
-  await("camera", "true");
-  press_and_release();
-  await("frame");
-  press_and_release();
-  await("phase", "working");
+  (void)capture_first_session();
   press_and_release();
   await("frame");
   EXPECT_EQ(sessions().size(), 2U);
@@ -170,13 +165,7 @@ TEST_F(Video, APressWhileTheModelIsMadeOrLaterBeginsAnotherSession) {
 
 TEST_F(Video, APressOnASessionThatIsGoneBeginsANewOne) {
   options_.rig.continue_within = std::chrono::hours(1);
-  start_daemon();
-  await("camera", "true");
-  press_and_release();
-  await("frame");
-  press_and_release();
-  await("phase", "working");
-  const std::string id = sessions()[0].manifest.id;
+  const std::string id = capture_first_session();
   models_.finish(ModelOutcome::kReady);
   await("phase", "idle");
   ASSERT_TRUE(control().remove_session(id));
