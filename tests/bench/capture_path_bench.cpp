@@ -1,6 +1,7 @@
 // What a frame costs between the camera and the disk: processor time (both threads' work in one)
 // and calls of operator new, for frames that are not kept and frames that are.
 
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -14,6 +15,7 @@
 #include "firmware/base/check.hpp"
 #include "firmware/daemon/frame_copies.hpp"
 #include "firmware/daemon/frame_store.hpp"
+#include "firmware/daemon/keyframe_stream.hpp"
 #include "firmware/daemon/sharpest_of_group.hpp"
 #include "firmware/daemon/still_shelf.hpp"
 #include "sfm/exchange/image_codec.hpp"
@@ -25,13 +27,18 @@ namespace {
 
 using std::chrono::milliseconds;
 
+constexpr int kWalk_px = 320;  // there and back, in the steps below
+constexpr int kStep_px = 8;
+
 enum Picture : int { kYuyv640x480, kMjpg1280x720 };
 
-cv::Mat textured(int width, int height, int channels) {
+/// Squares that stand `shift_px` to the right.
+cv::Mat textured(int width, int height, int channels, int shift_px) {
   cv::RNG random(3);
   cv::Mat picture(height, width, CV_8UC(channels), cv::Scalar::all(120));
   for (int i = 0; i < 3000; ++i) {
-    const cv::Rect square(random.uniform(0, width), random.uniform(0, height), 24, 24);
+    const int x = random.uniform(-kWalk_px, width);
+    const cv::Rect square(x + shift_px, random.uniform(0, height), 24, 24);
     const cv::Scalar colour(random.uniform(0, 255), random.uniform(0, 255), random.uniform(0, 255));
     cv::rectangle(picture, square, colour, cv::FILLED);
   }
@@ -41,16 +48,17 @@ cv::Mat textured(int width, int height, int channels) {
 /// A camera that gives the same frame again and again.
 class Camera {
  public:
-  explicit Camera(Picture picture) : pool_(std::make_shared<SlotPool>(1, nullptr)) {
+  explicit Camera(Picture picture, int shift_px = 0)
+      : pool_(std::make_shared<SlotPool>(1, nullptr)) {
     if (picture == kYuyv640x480) {
-      const cv::Mat pixels = textured(640, 480, 2);
+      const cv::Mat pixels = textured(640, 480, 2, shift_px);
       bytes_.assign(pixels.data, pixels.data + pixels.total() * pixels.elemSize());
       info_.layout.format = PixelFormat::kYuyv;
       info_.layout.width_px = 640;
       info_.layout.height_px = 480;
       info_.layout.stride_bytes = 1280;
     } else {
-      bytes_ = encode_jpeg(textured(1280, 720, 3), 90).value();
+      bytes_ = encode_jpeg(textured(1280, 720, 3, shift_px), 90).value();
       info_.layout.format = PixelFormat::kJpeg;
     }
     const std::size_t slot = *pool_->take();
@@ -76,33 +84,57 @@ FrameTimes at(std::uint64_t sequence) {
   return {time, time, time};
 }
 
+std::vector<Camera> camera_that_stands(Picture picture) {
+  std::vector<Camera> pictures;
+  pictures.emplace_back(picture);
+  return pictures;
+}
+
+/// One after the other they are a walk there and back.
+std::vector<Camera> camera_that_walks(Picture picture) {
+  std::vector<Camera> pictures;
+  for (int shift_px = 0; shift_px < 2 * kWalk_px; shift_px += kStep_px) {
+    pictures.emplace_back(picture, std::min(shift_px, 2 * kWalk_px - shift_px));
+  }
+  return pictures;
+}
+
 /// Runs `use(frame, sequence)` and counts.
 template <typename Use>
-void measure(benchmark::State& state, Use use) {
-  Camera camera(static_cast<Picture>(state.range(0)));
+void measure(benchmark::State& state, std::vector<Camera> pictures, Use use) {
   std::uint64_t sequence = 0;
-  for (; sequence < 64; ++sequence) {  // every buffer has held a frame once
-    use(camera.frame(), sequence);
+  const auto next = [&] {
+    Camera& camera = pictures[sequence % pictures.size()];
+    use(camera.frame(), sequence++);
+  };
+  while (sequence < 64) {  // every buffer has held a frame once
+    next();
   }
   const auto before = conformance::allocations_of_this_thread();
   for (auto _ : state) {
-    use(camera.frame(), sequence++);
+    next();
   }
   const auto after = conformance::allocations_of_this_thread();
   if (before && after) {
     state.counters["allocations_per_frame"] = benchmark::Counter(
         static_cast<double>(*after - *before), benchmark::Counter::kAvgIterations);
   }
-  state.counters["frame_bytes"] = static_cast<double>(camera.size_bytes());
+  state.counters["frame_bytes"] = static_cast<double>(pictures.front().size_bytes());
+}
+
+Picture picture_of(const benchmark::State& state) {
+  return static_cast<Picture>(state.range(0));
 }
 
 /// Still mode, nobody presses: the last frames are held.
 void hold_last_frames(benchmark::State& state) {
   FrameCopies copies(16);
   StillShelf shelf({.history = 8, .wait = milliseconds(2000)}, copies);
-  measure(state, [&](const Frame& frame, std::uint64_t sequence) {
-    TM_CHECK(shelf.offer(frame, at(sequence), sequence));
-  });
+  measure(state,
+          camera_that_stands(picture_of(state)),
+          [&](const Frame& frame, std::uint64_t sequence) {
+            TM_CHECK(shelf.offer(frame, at(sequence), sequence));
+          });
 }
 
 /// Video mode: the sharpest of five is chosen; nothing is stored.
@@ -110,9 +142,24 @@ void choose_among_frames(benchmark::State& state) {
   FrameCopies copies(16);
   SharpestOfGroup selector(5, copies);
   selector.begin({});
-  measure(state, [&](const Frame& frame, std::uint64_t sequence) {
-    benchmark::DoNotOptimize(selector.offer(frame, at(sequence), sequence));
-  });
+  measure(state,
+          camera_that_stands(picture_of(state)),
+          [&](const Frame& frame, std::uint64_t sequence) {
+            benchmark::DoNotOptimize(selector.offer(frame, at(sequence), sequence));
+          });
+}
+
+/// Video mode, keyframes: corners are followed and a verdict is given on each frame; nothing is
+/// stored.
+void select_keyframes(benchmark::State& state) {
+  const KeyframeOptions options;
+  FrameCopies copies(keyframe_copies(options, milliseconds(33)) + 2);
+  KeyframeStream selector(options, copies);
+  selector.begin({});
+  measure(
+      state, camera_that_walks(picture_of(state)), [&](const Frame& frame, std::uint64_t sequence) {
+        benchmark::DoNotOptimize(selector.offer(frame, at(sequence), sequence));
+      });
 }
 
 /// A frame that is kept: encoded if it is raw, hashed, written, fsynced, in the journal.
@@ -126,14 +173,17 @@ void store_frame(benchmark::State& state) {
   TM_CHECK(store.open().has_value());
   TM_CHECK(store.begin_session().has_value());
   FrameCopies copies(2);
-  measure(state, [&](const Frame& frame, std::uint64_t sequence) {
-    const TimedFrame timed{copies.copy(frame, sequence), at(sequence), sequence};
-    TM_CHECK(store.add_frame(timed).has_value());
-  });
+  measure(state,
+          camera_that_stands(picture_of(state)),
+          [&](const Frame& frame, std::uint64_t sequence) {
+            const TimedFrame timed{copies.copy(frame, sequence), at(sequence), sequence};
+            TM_CHECK(store.add_frame(timed).has_value());
+          });
 }
 
 BENCHMARK(hold_last_frames)->Arg(kYuyv640x480)->Arg(kMjpg1280x720);
 BENCHMARK(choose_among_frames)->Arg(kYuyv640x480)->Arg(kMjpg1280x720);
+BENCHMARK(select_keyframes)->Arg(kYuyv640x480)->Arg(kMjpg1280x720);
 BENCHMARK(store_frame)->Arg(kYuyv640x480)->Arg(kMjpg1280x720)->Iterations(200);
 
 }  // namespace
