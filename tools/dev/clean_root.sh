@@ -13,7 +13,8 @@ make_clean_root() {
   else
     trap "echo 'kept: $place'" EXIT
   fi
-  local options=(--aptopt='APT::Install-Recommends "false"')
+  # Nothing of it has to outlive a power cut, and packages are unpacked several times as fast.
+  local options=(--aptopt='APT::Install-Recommends "false"' --dpkgopt=force-unsafe-io)
   while IFS= read -r line; do
     options+=("--aptopt=$line")
   done < <(apt-config dump | grep -E '^Acquire::(https?::Proxy|Check-)' || true)
