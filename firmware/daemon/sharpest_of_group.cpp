@@ -13,8 +13,8 @@ void SharpestOfGroup::begin(std::chrono::nanoseconds from) {
 }
 
 StreamChoice SharpestOfGroup::offer(const Frame& frame,
-                                                const FrameTimes& times,
-                                                std::uint64_t sequence) {
+                                    const FrameTimes& times,
+                                    std::uint64_t sequence) {
   if (times.end < from_) {
     return {};
   }

@@ -7,8 +7,8 @@
 
 namespace trigmesh {
 
-/// The cameras that V4L2 and libcamera know, and after them the GPIO chips. What may not be opened is listed
-/// with a note.
+/// The cameras that V4L2 and libcamera know, and after them the GPIO chips. What may not be opened
+/// is listed with a note.
 [[nodiscard]] std::vector<DeviceInfo> find_devices();
 
 /// The GPIO chips below a folder of device nodes, sorted by name. Nothing when it cannot be read.

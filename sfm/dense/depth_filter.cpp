@@ -52,8 +52,9 @@ void judge_pixel(const FilterTask& task, int x, int y, DepthMap& out) {
       const MapOpinion opinion = comparison.ask(x, y);
       agreeing += opinion.verdict == MapVerdict::kAgrees ? 1 : 0;
       conflicting += opinion.verdict == MapVerdict::kConflicts ? 1 : 0;
-      sum += opinion.verdict == MapVerdict::kAgrees ? static_cast<double>(opinion.depth_in_reference)
-                                                 : 0.0;
+      sum += opinion.verdict == MapVerdict::kAgrees
+                 ? static_cast<double>(opinion.depth_in_reference)
+                 : 0.0;
     }
   }
   const float allowed = task.options.max_conflict_ratio * static_cast<float>(agreeing);

@@ -11,8 +11,8 @@ namespace trigmesh {
 
 /// Reads the model in a folder of COLMAP files, text or binary (text when both are there). `path`
 /// may be that folder, or one that holds it as `sparse`, `model/sparse` or `sparse/0`: a result of
-/// ours, its model folder, a workspace of COLMAP. Without a points3D file the model has no points. kNotFound, with the places that were tried, when
-/// there is none.
+/// ours, its model folder, a workspace of COLMAP. Without a points3D file the model has no points.
+/// kNotFound, with the places that were tried, when there is none.
 [[nodiscard]] Result<Scene> read_model(const std::filesystem::path& path);
 
 /// Names and poses of the same, without the points.

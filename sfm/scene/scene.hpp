@@ -24,11 +24,12 @@ struct Observation {
 
 /// One image of the scene with its pose, once known.
 struct View {
-  std::string name;                          ///< file name relative to the image folder, '/' as separator
+  std::string name;  ///< file name relative to the image folder, '/' as separator
   CameraId camera{};
-  std::optional<Rigid3> cam_from_world;      ///< absent while the image is not registered
+  std::optional<Rigid3> cam_from_world;       ///< absent while the image is not registered
   std::vector<Eigen::Vector2f> keypoints_px;  ///< first pixel centre = (0, 0)
-  std::vector<LandmarkId> landmarks;         ///< per keypoint: what it sees, or kNoLandmark; same length as keypoints_px
+  std::vector<LandmarkId>
+      landmarks;  ///< per keypoint: what it sees, or kNoLandmark; same length as keypoints_px
 };
 
 /// A 3D point with the keypoints that see it.
@@ -39,15 +40,17 @@ struct Landmark {
   std::vector<Observation> track;  ///< sorted; at least two views, at most one keypoint of each
 };
 
-/// Cameras, poses and points in one world frame: the result of mapping, the input of everything after it.
-/// Plain data. `views[i].landmarks` and `landmarks[j].track` say the same thing from both sides; `validate` checks it.
+/// Cameras, poses and points in one world frame: the result of mapping, the input of everything
+/// after it. Plain data. `views[i].landmarks` and `landmarks[j].track` say the same thing from both
+/// sides; `validate` checks it.
 struct Scene {
   std::vector<Camera> cameras;
   std::vector<View> views;
   std::vector<Landmark> landmarks;
 
-  /// Every index in range, both sides of every observation present, tracks sorted, poses and points finite. Used by
-  /// readers on what they read: a broken file gives kCorruptData with the first contradiction.
+  /// Every index in range, both sides of every observation present, tracks sorted, poses and points
+  /// finite. Used by readers on what they read: a broken file gives kCorruptData with the first
+  /// contradiction.
   [[nodiscard]] Result<> validate() const;
   /// How many views have a pose.
   [[nodiscard]] std::size_t registered_count() const;
