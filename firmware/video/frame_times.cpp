@@ -73,14 +73,16 @@ Result<> FrameTimeReader::read_line(std::string_view line) {
 
 Result<> FrameTimeReader::read_time_base(std::string_view text) {
   const std::size_t slash = text.find('/');
-  const auto above = whole_number(text.substr(0, slash));
-  const auto below =
-      slash == std::string_view::npos ? std::nullopt : whole_number(text.substr(slash + 1));
-  if (!above || !below || *above <= 0 || *below <= 0) {
+  if (slash == std::string_view::npos) {
     return bad_line(text);
   }
-  tick_numerator_ = *above;
-  tick_denominator_ = *below;
+  const std::int64_t above = whole_number(text.substr(0, slash)).value_or(0);
+  const std::int64_t below = whole_number(text.substr(slash + 1)).value_or(0);
+  if (above <= 0 || below <= 0) {
+    return bad_line(text);
+  }
+  tick_numerator_ = above;
+  tick_denominator_ = below;
   return {};
 }
 
