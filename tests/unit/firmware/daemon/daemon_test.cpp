@@ -51,16 +51,11 @@ TEST_F(Video, APressBeginsASessionAndTheNextClosesIt) {
 }
 
 TEST_F(Video, TheJournalTellsEdgesFramesAndStates) {
-  start_daemon();
-  await("camera", "true");
-  press_and_release();
-  await("frame", "\"frames\":2}");
-  press_and_release();
-  await("phase", "working");
+  const std::string id = capture_first_session();
   std::size_t edges = 0;
   std::size_t frames = 0;
   bool has_counts = false;
-  for (const JournalRecord& record : journal_of(sessions()[0].manifest.id)) {
+  for (const JournalRecord& record : journal_of(id)) {
     edges += std::holds_alternative<EdgeRecord>(record.entry) ? 1U : 0U;
     frames += std::holds_alternative<FrameKept>(record.entry) ? 1U : 0U;
     has_counts = has_counts || std::holds_alternative<DropCounts>(record.entry);
@@ -71,12 +66,7 @@ TEST_F(Video, TheJournalTellsEdgesFramesAndStates) {
 }
 
 TEST_F(Video, TheMakerOfModelsHearsOfTheCaptureFrameByFrame) {
-  start_daemon();
-  await("camera", "true");
-  press_and_release();
-  await("frame", "\"frames\":2}");
-  press_and_release();
-  await("phase", "working");
+  (void)capture_first_session();
   await_that([&] { return models_.news().back() == "ended"; });  // the storage's thread tells it
   const auto news = models_.news();
   ASSERT_GE(news.size(), 4U);
@@ -216,12 +206,7 @@ TEST_F(Video, HoldKeepsFramesWhileTheButtonIsDown) {
 }
 
 TEST_F(Video, ACaptureMayBeginWhileAModelIsMade) {
-  start_daemon();
-  await("camera", "true");
-  press_and_release();
-  await("frame");
-  press_and_release();
-  await("phase", "working");
+  (void)capture_first_session();
   press_and_release();  // pauses the model
   await("frame");
   EXPECT_EQ(status().job, JobState::kPaused);
@@ -238,12 +223,7 @@ TEST_F(Video, ACaptureMayBeginWhileAModelIsMade) {
 }
 
 TEST_F(Video, TheOperatorCancelsAModel) {
-  start_daemon();
-  await("camera", "true");
-  press_and_release();
-  await("frame");
-  press_and_release();
-  await("phase", "working");
+  (void)capture_first_session();
   EXPECT_TRUE(control().cancel_model());
   await("model", "cancelled");
   await("phase", "idle");
