@@ -193,9 +193,10 @@ Result<> SequenceMatcher::prepare() {
 /// Finds its pairs; nothing of it depends on the chain map.
 void SequenceMatcher::compare(std::size_t frame, Executor& executor) {
   const std::vector<std::size_t> near = neighbours_of(frame);
-  frames_[frame].near = match(near, frame, executor);
-  frames_[frame].far =
-      match(look_alikes_of(frame, near.empty() ? 0 : near.front(), executor), frame, executor);
+  const std::vector<PairRecord> near_pairs = match(near, frame, executor);
+  std::vector<PairRecord>& pairs = frames_[frame].pairs;
+  pairs = match(look_alikes_of(frame, near.empty() ? 0 : near.front(), executor), frame, executor);
+  pairs.insert(pairs.end(), near_pairs.begin(), near_pairs.end());
 }
 
 std::vector<PairRecord> SequenceMatcher::match(std::span<const std::size_t> partners,
@@ -221,22 +222,17 @@ Result<> SequenceMatcher::follow_until(std::size_t end) {
 Result<> SequenceMatcher::follow(std::size_t number) {
   Frame& frame = frames_[number];
   enter_chain(frame);
-  if (frame.is_judged) {
-    const std::span<const PairRecord> pairs = frame.pairs;
-    const std::size_t far_count = far_count_of(number);
-    add_to_chain(pairs.subspan(far_count));
-    add_to_chain(pairs.first(far_count));
-    grow(frame);
+  const std::span<PairRecord> pairs = frame.pairs;
+  const std::size_t far_count = far_count_of(number);
+  add_to_chain(pairs.subspan(far_count));
+  if (!frame.is_judged) {
+    judge(pairs.first(far_count));
+  }
+  add_to_chain(pairs.first(far_count));
+  grow(frame);
+  if (std::exchange(frame.is_judged, true)) {
     return {};
   }
-  add_to_chain(frame.near);
-  judge(frame.far);
-  add_to_chain(frame.far);
-  grow(frame);
-  frame.pairs = std::exchange(frame.far, {});
-  frame.pairs.insert(frame.pairs.end(), frame.near.begin(), frame.near.end());
-  frame.near = {};
-  frame.is_judged = true;
   return checkpoints_->save(checkpoint_name(number), frame.key, encode_pairs(frame.pairs));
 }
 

@@ -97,10 +97,8 @@ class SequenceMatcher {
     SequenceKeyframe keyframe;
     std::uint64_t key = 0;                      ///< of it and all before it
     std::optional<MatchableImage> matchable{};  ///< once something is compared with it
-    std::vector<PairRecord> near{};             ///< with its neighbours in time, until it is judged
-    std::vector<PairRecord> far{};              ///< with places that look alike, likewise
+    std::vector<PairRecord> pairs{};            ///< with places that look alike, with neighbours
     bool is_judged = false;                     ///< by the chain map, now or in an earlier run
-    std::vector<PairRecord> pairs{};            ///< once it is judged: far ones, near ones
     ViewId in_chain{};
   };
 

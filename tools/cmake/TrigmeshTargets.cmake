@@ -34,8 +34,7 @@ if(TRIGMESH_SANITIZE)
   endif()
 endif()
 
-# Sanitizer builds compile several files of a target as one: half the time. Files with a
-# name that a neighbour has too stay apart.
+# Sanitizer builds compile several files of a target as one: half the time. Files with a name that a neighbour has too stay apart.
 include(separate_sources)
 
 # trigmesh_join_sources(TARGET SOURCES..)
@@ -44,8 +43,8 @@ function(trigmesh_join_sources target)
     return()
   endif()
   set_target_properties(${target} PROPERTIES UNITY_BUILD ON)
+  cmake_path(RELATIVE_PATH CMAKE_CURRENT_SOURCE_DIR BASE_DIRECTORY "${CMAKE_SOURCE_DIR}" OUTPUT_VARIABLE folder)
   foreach(source IN LISTS ARGN)
-    cmake_path(RELATIVE_PATH CMAKE_CURRENT_SOURCE_DIR BASE_DIRECTORY "${CMAKE_SOURCE_DIR}" OUTPUT_VARIABLE folder)
     if("${folder}/${source}" IN_LIST separate_sources)
       set_source_files_properties("${source}" PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
     endif()
