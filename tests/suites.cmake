@@ -5,14 +5,10 @@ set(suites
   release/tests                       # all
   fuzz/tests/unit                     # unit tests, address and undefined sanitizers, clang
   fuzz/tests/conformance              # the same, all backends of the drivers
-  fuzz/tests/fuzz                     # every fuzz target for TRIGMESH_FUZZ_SECONDS
-  tsan/tests/conformance              # threads
-  tsan/tests/unit/drivers/camera
-  tsan/tests/unit/drivers/trigger
-  tsan/tests/unit/firmware/base
-  tsan/tests/unit/firmware/daemon
-  tsan/tests/unit/firmware/daemon/models
-  tsan/tests/unit/firmware/pipeline)
+  fuzz/tests/fuzz)                    # every fuzz target for TRIGMESH_FUZZ_SECONDS
+include("${CMAKE_CURRENT_LIST_DIR}/thread_folders.cmake")
+list(TRANSFORM thread_folders PREPEND "tsan/")
+list(APPEND suites ${thread_folders})
 set(content "# Written by tests/suites.cmake.\n")
 foreach(suite IN LISTS suites)
   if(NOT EXISTS "${ROOT}/build/${suite}/CTestTestfile.cmake")

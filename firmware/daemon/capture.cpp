@@ -18,6 +18,8 @@ using std::chrono::nanoseconds;
 constexpr milliseconds kLongestWait(100);
 /// So many damaged frames in a row are a fault of the camera.
 constexpr std::uint64_t kMostDamaged = 30;
+/// A record of the journal holds so many where no keyframe comes.
+constexpr std::size_t kVerdictsPerRecord = 32;
 
 std::string note_of(const StreamCounts& counts) {
   return fmt::format(
@@ -174,17 +176,31 @@ void Capture::use_frame(const Frame& frame) {
 
 void Capture::offer_to_stream(const Frame& frame, const FrameTimes& times, std::uint64_t sequence) {
   const std::uint64_t without_buffer = stream_->counts().no_buffer;
-  hand_out(stream_->offer(frame, times, sequence));
+  stream_->offer(frame, times, sequence, choice_);
+  hand_out_choice();
   parts_.drops.queue += stream_->counts().no_buffer - without_buffer;
 }
 
-void Capture::hand_out(StreamChoice choice) {
-  for (TimedFrame& kept : choice.kept) {
+/// The rig hears of every verdict at once, the journal of those up to a keyframe in one record.
+void Capture::hand_out_choice() {
+  for (const FrameJudged& judged : choice_.judged) {
+    (void)parts_.rig.push(FrameSeen{session_, judged});
+    verdicts_.push_back(judged);
+  }
+  choice_.judged.clear();
+  for (TimedFrame& kept : choice_.kept) {
     parts_.storage.push(StreamFrameOrder{session_, std::move(kept)});
   }
-  if (!choice.judged.empty()) {
-    (void)parts_.rig.push(FramesSeen{session_, choice.judged});
-    parts_.storage.push(RecordOrder{session_, FramesJudged{std::move(choice.judged)}});
+  if (!choice_.kept.empty() || verdicts_.size() >= kVerdictsPerRecord) {
+    record_verdicts();
+  }
+  choice_.kept.clear();
+}
+
+void Capture::record_verdicts() {
+  if (!verdicts_.empty()) {
+    parts_.storage.push(RecordOrder{session_, FramesJudged{verdicts_}});
+    verdicts_.clear();
   }
 }
 
@@ -196,7 +212,7 @@ void Capture::hold_before_press(const Frame& frame,
     return;
   }
   while (before_press_.size() >= options_.pre_trigger_frames) {
-    before_press_.pop_front();
+    before_press_.erase(before_press_.begin());
   }
   if (Frame copy = parts_.copies.copy(frame, sequence); !copy.empty()) {
     before_press_.push_back({std::move(copy), times, sequence});
@@ -244,16 +260,19 @@ void Capture::do_orders() {
 void Capture::do_order(const BeginStream& order) {
   session_ = order.serial;
   stream_->begin(order.from);
-  while (!before_press_.empty()) {
-    const TimedFrame held = std::move(before_press_.front());
-    before_press_.pop_front();
-    offer_to_stream(held.frame, held.times, held.sequence);
+  for (TimedFrame& held : before_press_) {
+    // Its buffer is free before the next one is copied.
+    const TimedFrame frame = std::move(held);
+    offer_to_stream(frame.frame, frame.times, frame.sequence);
   }
+  before_press_.clear();
 }
 
 void Capture::do_order(const EndStream& order) {
   tell(hold_.check(controls()));
-  hand_out(stream_->end());
+  stream_->end(choice_);
+  hand_out_choice();
+  record_verdicts();
   parts_.storage.push(StreamDoneOrder{order.serial, note_of(stream_->counts())});
 }
 

@@ -3,12 +3,12 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <stop_token>
 #include <string>
+#include <vector>
 
 #include "drivers/camera/frame_source.hpp"
 #include "firmware/base/clock.hpp"
@@ -98,7 +98,8 @@ class Capture {
 
   void hand_out_stills();
   void offer_to_stream(const Frame& frame, const FrameTimes& times, std::uint64_t sequence);
-  void hand_out(StreamChoice choice);
+  void hand_out_choice();
+  void record_verdicts();
   void hold_before_press(const Frame& frame, const FrameTimes& times, std::uint64_t sequence);
   void check_hold();
   void tell(const std::vector<std::string>& sentences);
@@ -109,7 +110,9 @@ class Capture {
   CaptureParts parts_;
   StillShelf shelf_;
   std::unique_ptr<StreamSelector> stream_;
-  std::deque<TimedFrame> before_press_;
+  StreamChoice choice_;                   ///< not handed out yet
+  std::vector<FrameJudged> verdicts_;     ///< not in the journal yet
+  std::vector<TimedFrame> before_press_;  ///< the oldest first
   CameraHold hold_;
   Retries retries_;
   SessionSerial session_{};  ///< that began last

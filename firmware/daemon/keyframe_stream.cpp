@@ -36,41 +36,38 @@ void KeyframeStream::begin(std::chrono::nanoseconds from) {
   counts_ = {};
 }
 
-StreamChoice KeyframeStream::offer(const Frame& frame,
-                                   const FrameTimes& times,
-                                   std::uint64_t sequence) {
+void KeyframeStream::offer(const Frame& frame,
+                           const FrameTimes& times,
+                           std::uint64_t sequence,
+                           StreamChoice& choice) {
   if (times.end < from_) {
-    return {};
+    return;
   }
   ++counts_.seen;
   const Result<> reduced = reducer_.reduce(frame.info().layout, frame.bytes());
-  const cv::Size size(reducer_.width_px(), reducer_.height_px());
-  if (!reduced || (!size_.empty() && size != size_) || times.middle <= last_time_) {
+  const cv::Mat& grey = reducer_.grey();
+  if (!reduced || (!size_.empty() && grey.size() != size_) || times.middle <= last_time_) {
     ++counts_.damaged;
-    return {};
+    return;
   }
-  size_ = size;
+  size_ = grey.size();
   last_time_ = times.middle;
   Frame copy = copies_.copy(frame, sequence);
   if (copy.empty()) {
     ++counts_.no_buffer;
-    return {};
+    return;
   }
   held_.push_back({std::move(copy), times, sequence});
-  // The selector makes a copy of its own, at the size at which it looks.
-  const cv::Mat grey(size, CV_8UC1, const_cast<std::uint8_t*>(reducer_.grey().data()));
-  return carry_out(selector_.offer({sequence, times.middle, grey.clone()}));
+  carry_out(selector_.offer({sequence, times.middle, grey}), choice);
 }
 
-StreamChoice KeyframeStream::end() {
+void KeyframeStream::end(StreamChoice& choice) {
   is_streaming_ = false;
-  StreamChoice choice = carry_out(selector_.finish());
+  carry_out(selector_.finish(), choice);
   held_.clear();
-  return choice;
 }
 
-StreamChoice KeyframeStream::carry_out(const std::vector<FrameDecision>& decisions) {
-  StreamChoice choice;
+void KeyframeStream::carry_out(std::span<const FrameDecision> decisions, StreamChoice& choice) {
   for (const FrameDecision& decision : decisions) {
     TimedFrame frame = take_held(decision.id);
     choice.judged.push_back({decision.id, frame.times.middle, decision.verdict, decision.measures});
@@ -84,7 +81,6 @@ StreamChoice KeyframeStream::carry_out(const std::vector<FrameDecision>& decisio
   std::sort(choice.kept.begin(), choice.kept.end(), [](const TimedFrame& a, const TimedFrame& b) {
     return a.sequence < b.sequence;
   });
-  return choice;
 }
 
 TimedFrame KeyframeStream::take_held(std::uint64_t sequence) {

@@ -2,7 +2,8 @@
 
 #include <chrono>
 #include <cstdint>
-#include <deque>
+#include <span>
+#include <vector>
 
 #include "firmware/daemon/frame_copies.hpp"
 #include "firmware/daemon/stream_selector.hpp"
@@ -20,17 +21,18 @@ class KeyframeStream final : public StreamSelector {
   KeyframeStream(const KeyframeOptions& options, FrameCopies& copies);
 
   void begin(std::chrono::nanoseconds from) override;
-  [[nodiscard]] StreamChoice offer(const Frame& frame,
-                                   const FrameTimes& times,
-                                   std::uint64_t sequence) override;
-  [[nodiscard]] StreamChoice end() override;
+  void offer(const Frame& frame,
+             const FrameTimes& times,
+             std::uint64_t sequence,
+             StreamChoice& choice) override;
+  void end(StreamChoice& choice) override;
 
   [[nodiscard]] bool is_streaming() const override { return is_streaming_; }
 
   [[nodiscard]] const StreamCounts& counts() const override { return counts_; }
 
  private:
-  [[nodiscard]] StreamChoice carry_out(const std::vector<FrameDecision>& decisions);
+  void carry_out(std::span<const FrameDecision> decisions, StreamChoice& choice);
   [[nodiscard]] TimedFrame take_held(std::uint64_t sequence);
 
   KeyframeSelector selector_;
@@ -40,7 +42,7 @@ class KeyframeStream final : public StreamSelector {
   std::chrono::nanoseconds from_{};
   cv::Size size_;  ///< of the frames of this stream, reduced
   std::chrono::nanoseconds last_time_{};
-  std::deque<TimedFrame> held_;  ///< without a decision so far, in the order of their sequences
+  std::vector<TimedFrame> held_;  ///< without a decision so far, in the order of their sequences
   StreamCounts counts_;
 };
 

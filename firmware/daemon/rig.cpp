@@ -179,9 +179,9 @@ void Rig::hear(StreamFrameStored& input) {
   }
 }
 
-void Rig::hear(FramesSeen& input) {
+void Rig::hear(FrameSeen& input) {
   if (is_current(input.serial)) {
-    guide_.see(input.frames);
+    guide_.see({&input.frame, 1});
     tell_advice();
   }
 }

@@ -66,7 +66,7 @@ class Rig {
   void hear(SessionOpened& input);
   void hear(SessionLost& input);
   void hear(StreamFrameStored& input);
-  void hear(FramesSeen& input);
+  void hear(FrameSeen& input);
   void hear(MapFollowed& input);
   void hear(StillAnswered& input);
   void hear(StreamDrained& input);

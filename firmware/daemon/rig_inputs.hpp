@@ -47,10 +47,10 @@ struct StreamFrameStored {
   std::uint32_t number = 0;
 };
 
-/// What was said of frames of the stream.
-struct FramesSeen {
+/// What was said of a frame of the stream.
+struct FrameSeen {
   SessionSerial serial{};
-  std::vector<FrameJudged> frames;
+  FrameJudged frame;
 };
 
 /// Answers a still: the number of the frame, or why there is none.
@@ -100,7 +100,7 @@ using RigInput = std::variant<EdgeSeen,
                               SessionOpened,
                               SessionLost,
                               StreamFrameStored,
-                              FramesSeen,
+                              FrameSeen,
                               MapFollowed,
                               StillAnswered,
                               StreamDrained,

@@ -12,16 +12,19 @@ void SharpestOfGroup::begin(std::chrono::nanoseconds from) {
   counts_ = {};
 }
 
-StreamChoice SharpestOfGroup::offer(const Frame& frame,
-                                    const FrameTimes& times,
-                                    std::uint64_t sequence) {
+void SharpestOfGroup::offer(const Frame& frame,
+                            const FrameTimes& times,
+                            std::uint64_t sequence,
+                            StreamChoice& choice) {
   if (times.end < from_) {
-    return {};
+    return;
   }
   ++counts_.seen;
   ++in_group_;
   compare(frame, times, sequence);
-  return in_group_ == group_size_ ? finish_group() : StreamChoice{};
+  if (in_group_ == group_size_) {
+    finish_group(choice);
+  }
 }
 
 void SharpestOfGroup::compare(const Frame& frame, const FrameTimes& times, std::uint64_t sequence) {
@@ -48,25 +51,23 @@ void SharpestOfGroup::compare(const Frame& frame, const FrameTimes& times, std::
   best_sharpness_ = sharpness;
 }
 
-StreamChoice SharpestOfGroup::finish_group() {
+void SharpestOfGroup::finish_group(StreamChoice& choice) {
   in_group_ = 0;
-  StreamChoice choice;
   if (best_) {
     ++counts_.kept;
     choice.kept.push_back(*std::move(best_));
     best_.reset();
   }
-  return choice;
 }
 
-StreamChoice SharpestOfGroup::end() {
+void SharpestOfGroup::end(StreamChoice& choice) {
   is_streaming_ = false;
   if (2 * in_group_ >= group_size_ || counts_.kept == 0) {
-    return finish_group();
+    finish_group(choice);
+    return;
   }
   counts_.not_chosen += best_ ? 1U : 0U;
   best_.reset();
-  return {};
 }
 
 }  // namespace trigmesh

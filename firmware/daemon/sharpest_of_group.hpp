@@ -20,10 +20,11 @@ class SharpestOfGroup final : public StreamSelector {
       : group_size_(group_size), copies_(copies) {}
 
   void begin(std::chrono::nanoseconds from) override;
-  [[nodiscard]] StreamChoice offer(const Frame& frame,
-                                   const FrameTimes& times,
-                                   std::uint64_t sequence) override;
-  [[nodiscard]] StreamChoice end() override;
+  void offer(const Frame& frame,
+             const FrameTimes& times,
+             std::uint64_t sequence,
+             StreamChoice& choice) override;
+  void end(StreamChoice& choice) override;
 
   [[nodiscard]] bool is_streaming() const override { return is_streaming_; }
 
@@ -31,7 +32,7 @@ class SharpestOfGroup final : public StreamSelector {
 
  private:
   void compare(const Frame& frame, const FrameTimes& times, std::uint64_t sequence);
-  [[nodiscard]] StreamChoice finish_group();
+  void finish_group(StreamChoice& choice);
 
   std::size_t group_size_;
   FrameCopies& copies_;

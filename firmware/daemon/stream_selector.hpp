@@ -17,9 +17,9 @@ struct StreamCounts {
   std::uint64_t no_buffer = 0;   ///< the storage had all buffers
 };
 
-/// What became certain with a frame. Empty most of the time: then nothing is allocated.
+/// What became certain. Emptied and used again, it takes no more memory.
 struct StreamChoice {
-  std::vector<TimedFrame> kept;     ///< in the order of their times
+  std::vector<TimedFrame> kept;     ///< of one frame that came: in the order of their times
   std::vector<FrameJudged> judged;  ///< with reasons, where there are any
 };
 
@@ -36,13 +36,14 @@ class StreamSelector {
   /// A stream begins: frames that were exposed before `from` do not belong to it.
   virtual void begin(std::chrono::nanoseconds from) = 0;
 
-  /// A frame came. Precondition: is_streaming().
-  [[nodiscard]] virtual StreamChoice offer(const Frame& frame,
-                                           const FrameTimes& times,
-                                           std::uint64_t sequence) = 0;
+  /// A frame came; adds what became certain with it to `choice`. Precondition: is_streaming().
+  virtual void offer(const Frame& frame,
+                     const FrameTimes& times,
+                     std::uint64_t sequence,
+                     StreamChoice& choice) = 0;
 
-  /// The stream ends: decides what is left.
-  [[nodiscard]] virtual StreamChoice end() = 0;
+  /// The stream ends: decides what is left, and adds it to `choice`.
+  virtual void end(StreamChoice& choice) = 0;
 
   [[nodiscard]] virtual bool is_streaming() const = 0;
 

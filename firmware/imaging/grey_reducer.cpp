@@ -110,16 +110,14 @@ Result<> GreyReducer::reduce_jpeg(std::span<const std::uint8_t> bytes) {
   while (divisor < 8 && width / (2 * divisor) >= kWidthPx) {
     divisor *= 2;
   }
-  width_ = (width + divisor - 1) / divisor;
-  height_ = (height + divisor - 1) / divisor;
-  grey_.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
+  grey_.create((height + divisor - 1) / divisor, (width + divisor - 1) / divisor, CV_8UC1);
   if (tjDecompress2(handle,
                     bytes.data(),
                     size,
-                    grey_.data(),
-                    width_,
-                    /*pitch=*/width_,
-                    height_,
+                    grey_.data,
+                    grey_.cols,
+                    /*pitch=*/grey_.cols,
+                    grey_.rows,
                     TJPF_GRAY,
                     TJFLAG_FASTDCT) != 0 &&
       tjGetErrorCode(handle) != TJERR_WARNING) {
@@ -153,16 +151,14 @@ Result<> GreyReducer::reduce_raw(const FrameLayout& layout, std::span<const std:
   // A Bayer pattern is averaged over whole cells, or it would count as edges.
   const int smallest_side = is_bayer(layout.format) ? 2 : 1;
   const int side = std::max(layout.width_px / kWidthPx, smallest_side);
-  width_ = layout.width_px / side;
-  height_ = layout.height_px / side;
-  grey_.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
+  grey_.create(layout.height_px / side, layout.width_px / side, CV_8UC1);
   const auto [first, step] = brightness_of(layout.format);
   const auto block = static_cast<std::size_t>(side);
-  std::uint8_t* out = grey_.data();
-  for (std::size_t y = 0; y < static_cast<std::size_t>(height_); ++y) {
-    const std::uint8_t* row = bytes.data() + y * block * layout.stride_bytes + first;
-    for (std::size_t x = 0; x < static_cast<std::size_t>(width_); ++x) {
-      *out++ = mean_of_block(row + x * block * step, layout.stride_bytes, step, block);
+  const std::uint8_t* row = bytes.data() + first;
+  for (int y = 0; y < grey_.rows; ++y, row += block * layout.stride_bytes) {
+    const std::uint8_t* cell = row;
+    for (int x = 0; x < grey_.cols; ++x, cell += block * step) {
+      grey_.at<std::uint8_t>(y, x) = mean_of_block(cell, layout.stride_bytes, step, block);
     }
   }
   return {};

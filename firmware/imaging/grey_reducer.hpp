@@ -3,7 +3,8 @@
 #include <cstdint>
 #include <memory>
 #include <span>
-#include <vector>
+
+#include <opencv2/core/mat.hpp>
 
 #include "drivers/camera/pixel_format.hpp"
 #include "firmware/base/result.hpp"
@@ -29,12 +30,8 @@ class GreyReducer {
   /// camera has.
   [[nodiscard]] Result<> reduce(const FrameLayout& layout, std::span<const std::uint8_t> bytes);
 
-  /// Of the frame reduced last: rows of width_px() grey levels, until the next reduce().
-  [[nodiscard]] const std::vector<std::uint8_t>& grey() const { return grey_; }
-
-  [[nodiscard]] int width_px() const { return width_; }
-
-  [[nodiscard]] int height_px() const { return height_; }
+  /// The frame reduced last, CV_8UC1; the next reduce() writes over it.
+  [[nodiscard]] const cv::Mat& grey() const { return grey_; }
 
  private:
   struct Decoder;
@@ -44,9 +41,7 @@ class GreyReducer {
   [[nodiscard]] Result<> reduce_raw(const FrameLayout& layout, std::span<const std::uint8_t> bytes);
 
   std::unique_ptr<Decoder> decoder_;
-  std::vector<std::uint8_t> grey_;
-  int width_ = 0;
-  int height_ = 0;
+  cv::Mat grey_;
 };
 
 }  // namespace trigmesh

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <span>
 #include <utility>
 
 #include <fmt/format.h>
@@ -104,10 +105,10 @@ class VideoReader {
     take(selector_.offer({frame, photos_.timestamps[frame], grey}));
   }
 
-  void take(std::vector<FrameDecision> decisions) {
-    for (FrameDecision& decision : decisions) {
+  void take(std::span<const FrameDecision> decisions) {
+    for (const FrameDecision& decision : decisions) {
       is_kept_[decision.id] = decision.verdict == FrameVerdict::kKept;
-      decisions_[decision.id] = std::move(decision);
+      decisions_[decision.id] = decision;
     }
   }
 

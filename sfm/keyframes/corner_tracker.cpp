@@ -14,7 +14,6 @@ namespace {
 using Eigen::Vector2f;
 
 constexpr int kMaxPatchRadius = 15;
-constexpr int kSmallestSide = 16;
 /// A patch with a border of one pixel, for gradients.
 constexpr int kMaxPatchPixels = (2 * kMaxPatchRadius + 3) * (2 * kMaxPatchRadius + 3);
 /// A step below this ends the iterations of a level, pixels.
@@ -215,25 +214,6 @@ Result<> CornerTrackerOptions::validate() const {
   return {};
 }
 
-ImagePyramid build_pyramid(const cv::Mat& grey, int levels) {
-  TM_CHECK(grey.type() == CV_8UC1);
-  ImagePyramid pyramid = {grey};
-  while (static_cast<int>(pyramid.size()) < levels &&
-         std::min(pyramid.back().cols, pyramid.back().rows) >= 2 * kSmallestSide) {
-    cv::Mat half;
-    const cv::Mat& whole = pyramid.back();
-    // The mean of 2 x 2 pixels keeps pixel centres where follow() expects them.
-    cv::resize(whole(cv::Rect(0, 0, whole.cols / 2 * 2, whole.rows / 2 * 2)),
-               half,
-               {whole.cols / 2, whole.rows / 2},
-               0,
-               0,
-               cv::INTER_AREA);
-    pyramid.push_back(half);
-  }
-  return pyramid;
-}
-
 std::vector<Vector2f> find_corners(const cv::Mat& grey, const CornerTrackerOptions& options) {
   TM_CHECK(grey.type() == CV_8UC1);
   constexpr int kBlockSide = 5;
@@ -260,26 +240,18 @@ std::vector<Vector2f> find_corners(const cv::Mat& grey, const CornerTrackerOptio
   return corners;
 }
 
-std::vector<std::optional<Vector2f>> track_corners(const ImagePyramid& first,
-                                                   const ImagePyramid& second,
-                                                   std::span<const Vector2f> corners,
-                                                   std::span<const Vector2f> guesses,
-                                                   const CornerTrackerOptions& options) {
-  TM_CHECK(guesses.empty() || guesses.size() == corners.size());
-  const auto max_roundtrip = static_cast<float>(options.max_roundtrip_px);
-  std::vector<std::optional<Vector2f>> tracked(corners.size());
-  for (std::size_t i = 0; i < corners.size(); ++i) {
-    const Vector2f& guess = guesses.empty() ? corners[i] : guesses[i];
-    const std::optional<Vector2f> there = follow(first, second, corners[i], guess, options);
-    if (!there.has_value()) {
-      continue;
-    }
-    const std::optional<Vector2f> back = follow(second, first, *there, corners[i], options);
-    if (back.has_value() && (*back - corners[i]).norm() <= max_roundtrip) {
-      tracked[i] = there;
-    }
+std::optional<Vector2f> track_corner(const ImagePyramid& first,
+                                     const ImagePyramid& second,
+                                     const Vector2f& corner,
+                                     const CornerTrackerOptions& options) {
+  const std::optional<Vector2f> there = follow(first, second, corner, corner, options);
+  if (!there.has_value()) {
+    return std::nullopt;
   }
-  return tracked;
+  const std::optional<Vector2f> back = follow(second, first, *there, corner, options);
+  const bool comes_back =
+      back.has_value() && (*back - corner).norm() <= static_cast<float>(options.max_roundtrip_px);
+  return comes_back ? there : std::nullopt;
 }
 
 }  // namespace trigmesh

@@ -1,13 +1,13 @@
 #pragma once
 
 #include <optional>
-#include <span>
 #include <vector>
 
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
 
 #include "firmware/base/result.hpp"
+#include "sfm/keyframes/image_pyramid.hpp"
 
 namespace trigmesh {
 
@@ -25,28 +25,19 @@ struct CornerTrackerOptions {
   [[nodiscard]] Result<> validate() const;
 };
 
-/// An image and its halves. Level 0 is the image itself.
-using ImagePyramid = std::vector<cv::Mat>;
-
-/// Levels that would be smaller than 16 pixels on a side are left out. `grey`: CV_8UC1, not copied.
-[[nodiscard]] ImagePyramid build_pyramid(const cv::Mat& grey, int levels);
-
 /// Corners worth following: the smaller eigenvalue of the gradients' second moments is large
 /// (Shi and Tomasi, "Good Features to Track", CVPR 1994). Strongest first. Pixels of `grey`,
 /// CV_8UC1. Precondition: valid options.
 [[nodiscard]] std::vector<Eigen::Vector2f> find_corners(const cv::Mat& grey,
                                                         const CornerTrackerOptions& options);
 
-/// Where each corner of the first image lies in the second: translation of a patch, coarse to fine
+/// Where a corner of the first image lies in the second: translation of a patch, coarse to fine
 /// (Lucas and Kanade, "An Iterative Image Registration Technique", IJCAI 1981, in the inverse
 /// compositional form of Baker and Matthews, IJCV 2004, on patches of equal mean and contrast).
 /// Nothing where the patch leaves the image, does not look alike, or tracked back ends elsewhere.
-/// `guesses`: positions in the second image to start from, one a corner, or empty: not moved.
-[[nodiscard]] std::vector<std::optional<Eigen::Vector2f>> track_corners(
-    const ImagePyramid& first,
-    const ImagePyramid& second,
-    std::span<const Eigen::Vector2f> corners,
-    std::span<const Eigen::Vector2f> guesses,
-    const CornerTrackerOptions& options);
+[[nodiscard]] std::optional<Eigen::Vector2f> track_corner(const ImagePyramid& first,
+                                                          const ImagePyramid& second,
+                                                          const Eigen::Vector2f& corner,
+                                                          const CornerTrackerOptions& options);
 
 }  // namespace trigmesh

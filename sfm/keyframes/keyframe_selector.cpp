@@ -1,13 +1,15 @@
 #include "sfm/keyframes/keyframe_selector.hpp"
 
 #include <algorithm>
+#include <array>
+#include <span>
 #include <utility>
 
 #include <Eigen/Geometry>
-#include <opencv2/imgproc.hpp>
+#include <opencv2/core.hpp>
 
 #include "firmware/base/check.hpp"
-#include "sfm/keyframes/view_change.hpp"
+#include "sfm/keyframes/sharpness.hpp"
 
 namespace trigmesh {
 namespace {
@@ -31,42 +33,22 @@ constexpr double kMostFocalRatio = 10.0;
 /// A picture with fewer corners is too dark or too blurred to go on from.
 constexpr std::size_t kFewestCorners = 16;
 
-/// The value below which `share` of the last `count` values lie.
-double quantile(const std::deque<double>& values, std::size_t count, double share) {
-  const auto first =
-      values.size() > count ? values.end() - static_cast<std::ptrdiff_t>(count) : values.begin();
-  std::vector<double> last(first, values.end());
+/// The value below which `share` of the last `count` values lie. Precondition: there is a value.
+double quantile(std::span<const double> values, std::size_t count, double share) {
+  const auto last = values.last(std::min(values.size(), count));
+  std::array<double, kSharpnessHistory> sorted{};
+  const auto end = std::copy(last.begin(), last.end(), sorted.begin());
   const auto place =
-      last.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(last.size()));
-  std::nth_element(last.begin(), place, last.end());
+      sorted.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(last.size()));
+  std::nth_element(sorted.begin(), place, end);
   return *place;
 }
 
-void remember(std::deque<double>& values, double value, std::size_t count) {
+void remember(std::vector<double>& values, double value, std::size_t count) {
+  if (values.size() == count) {
+    values.erase(values.begin());
+  }
   values.push_back(value);
-  if (values.size() > count) {
-    values.pop_front();
-  }
-}
-
-double sharpness_of(const cv::Mat& grey) {
-  cv::Mat laplacian;
-  cv::Laplacian(grey, laplacian, CV_16S);
-  cv::Scalar mean;
-  cv::Scalar deviation;
-  cv::meanStdDev(laplacian, mean, deviation);
-  return deviation[0] * deviation[0];
-}
-
-cv::Mat reduce(const cv::Mat& grey, int side_px) {
-  const int side = std::max(grey.cols, grey.rows);
-  if (side <= side_px) {
-    return grey.clone();
-  }
-  const double scale = static_cast<double>(side_px) / side;
-  cv::Mat reduced;
-  cv::resize(grey, reduced, {}, scale, scale, cv::INTER_AREA);
-  return reduced;
 }
 
 bool is_same_picture(const cv::Mat& a, const cv::Mat& b) {
@@ -111,19 +93,21 @@ Result<KeyframeSelector> KeyframeSelector::create(const KeyframeOptions& options
   return KeyframeSelector(options);
 }
 
-std::vector<FrameDecision> KeyframeSelector::offer(const VideoFrame& frame) {
+std::span<const FrameDecision> KeyframeSelector::offer(const VideoFrame& frame) {
+  decisions_.clear();
   Candidate candidate = look_at(frame);
-  const bool is_duplicate =
-      !last_pyramid_.empty() && is_same_picture(last_pyramid_.front(), candidate.pyramid.front());
+  const bool is_duplicate = last_pyramid_ != nullptr &&
+                            is_same_picture(last_pyramid_->front(), candidate.pyramid->front());
   if (is_duplicate) {
     decide(candidate, FrameVerdict::kDuplicate);
   } else {
     judge(std::move(candidate));
   }
-  return std::exchange(decisions_, {});
+  return decisions_;
 }
 
-std::vector<FrameDecision> KeyframeSelector::finish() {
+std::span<const FrameDecision> KeyframeSelector::finish() {
+  decisions_.clear();
   // A stretch that has not come to its end is worth a sharp frame only.
   while (!stretch_.empty()) {
     const std::size_t best = choose_keyframe();
@@ -136,9 +120,11 @@ std::vector<FrameDecision> KeyframeSelector::finish() {
       decide(candidate, candidate.refusal);
     }
   }
-  std::vector<FrameDecision> decisions = std::exchange(decisions_, {});
-  *this = KeyframeSelector(options_);
-  return decisions;
+  KeyframeSelector anew(options_);
+  anew.decisions_ = std::move(decisions_);
+  anew.pyramids_ = std::move(pyramids_);
+  *this = std::move(anew);
+  return decisions_;
 }
 
 KeyframeSelector::Candidate KeyframeSelector::look_at(const VideoFrame& frame) {
@@ -146,11 +132,10 @@ KeyframeSelector::Candidate KeyframeSelector::look_at(const VideoFrame& frame) {
   Candidate candidate;
   candidate.id = frame.id;
   candidate.timestamp = frame.timestamp;
-  candidate.pyramid =
-      build_pyramid(reduce(frame.grey, options_.image_side_px), options_.tracker.levels);
-  const cv::Mat& grey = candidate.pyramid.front();
+  candidate.pyramid = pyramids_.make(frame.grey, options_.image_side_px, options_.tracker.levels);
+  const cv::Mat& grey = candidate.pyramid->front();
   image_size_ = grey.size();
-  candidate.measures.sharpness = sharpness_of(grey);
+  candidate.measures.sharpness = variance_of_laplacian(grey);
   candidate.measures.brightness = cv::mean(grey)[0];
   remember(last_sharpness_, candidate.measures.sharpness, kSharpnessHistory);
   candidate.measures.relative_sharpness =
@@ -235,10 +220,14 @@ void KeyframeSelector::extend_stretch(Candidate candidate) {
 }
 
 void KeyframeSelector::forget_early_frames() {
-  while (stretch_.back().timestamp - stretch_.front().timestamp > options_.patience) {
-    decide(stretch_.front(), stretch_.front().refusal);
-    stretch_.pop_front();
+  const std::chrono::nanoseconds earliest = stretch_.back().timestamp - options_.patience;
+  const auto first = std::find_if(stretch_.begin(), stretch_.end(), [&](const Candidate& one) {
+    return one.timestamp >= earliest;
+  });
+  for (auto early = stretch_.begin(); early != first; ++early) {
+    decide(*early, early->refusal);
   }
+  stretch_.erase(stretch_.begin(), first);
 }
 
 /// Whether it is worth and safe to wait for a sharper frame.
@@ -290,7 +279,8 @@ std::size_t KeyframeSelector::choose_keyframe() const {
 
 void KeyframeSelector::close_stretch() {
   const std::size_t best = choose_keyframe();
-  const std::deque<Candidate> stretch = std::exchange(stretch_, {});
+  const std::vector<Candidate> stretch = std::exchange(stretch_, {});
+  stretch_.reserve(stretch.capacity());
   stretch_begin_.reset();
   const bool has_keyframe = best < stretch.size() && start_from(stretch[best]);
   if (!has_keyframe) {
@@ -306,7 +296,7 @@ void KeyframeSelector::close_stretch() {
 }
 
 bool KeyframeSelector::start_from(const Candidate& keyframe) {
-  reference_ = find_corners(keyframe.pyramid.front(), options_.tracker);
+  reference_ = find_corners(keyframe.pyramid->front(), options_.tracker);
   if (reference_.size() < kFewestCorners) {
     return false;
   }
@@ -316,39 +306,32 @@ bool KeyframeSelector::start_from(const Candidate& keyframe) {
   return true;
 }
 
-void KeyframeSelector::follow_corners(const ImagePyramid& pyramid) {
-  std::vector<Eigen::Vector2f> before;
-  std::vector<std::size_t> index;
-  for (std::size_t i = 0; i < corners_.size(); ++i) {
-    if (corners_[i].has_value()) {
-      before.push_back(*corners_[i]);
-      index.push_back(i);
+void KeyframeSelector::follow_corners(const std::shared_ptr<const ImagePyramid>& pyramid) {
+  std::size_t followed = 0;
+  std::size_t lost = 0;
+  for (std::optional<Eigen::Vector2f>& corner : corners_) {
+    if (corner.has_value()) {
+      ++followed;
+      corner = track_corner(*last_pyramid_, *pyramid, *corner, options_.tracker);
+      lost += corner.has_value() ? 0U : 1U;
     }
   }
-  const std::vector<std::optional<Eigen::Vector2f>> after =
-      track_corners(last_pyramid_, pyramid, before, {}, options_.tracker);
-  std::size_t lost = 0;
-  for (std::size_t i = 0; i < index.size(); ++i) {
-    corners_[index[i]] = after[i];
-    lost += after[i].has_value() ? 0U : 1U;
-  }
-  step_loss_ = index.empty() ? 1.0 : static_cast<double>(lost) / static_cast<double>(index.size());
+  step_loss_ = followed == 0 ? 1.0 : static_cast<double>(lost) / static_cast<double>(followed);
   last_pyramid_ = pyramid;
 }
 
-void KeyframeSelector::measure_motion(FrameMeasures& measures) const {
-  std::vector<Eigen::Vector3d> first;
-  std::vector<Eigen::Vector3d> second;
+void KeyframeSelector::measure_motion(FrameMeasures& measures) {
+  view_change_.begin();
   for (std::size_t i = 0; i < corners_.size(); ++i) {
     if (corners_[i].has_value()) {
-      first.push_back(ray_of(reference_[i]));
-      second.push_back(ray_of(*corners_[i]));
+      view_change_.add(ray_of(reference_[i]), ray_of(*corners_[i]));
     }
   }
-  const ViewChange change = view_change(first, second);
+  const ViewChange change = view_change_.measure();
   measures.motion_deg = change.motion_deg;
   measures.parallax_deg = change.parallax_deg;
-  measures.overlap = static_cast<double>(first.size()) / static_cast<double>(reference_.size());
+  measures.overlap =
+      static_cast<double>(view_change_.ray_count()) / static_cast<double>(reference_.size());
 }
 
 bool KeyframeSelector::has_moved(const Candidate& candidate) const {

@@ -3,8 +3,9 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
-#include <deque>
+#include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -13,6 +14,8 @@
 #include "firmware/base/result.hpp"
 #include "sfm/keyframes/corner_tracker.hpp"
 #include "sfm/keyframes/frame_verdict.hpp"
+#include "sfm/keyframes/image_pyramid.hpp"
+#include "sfm/keyframes/view_change.hpp"
 
 namespace trigmesh {
 
@@ -61,7 +64,7 @@ struct KeyframeOptions {
 struct VideoFrame {
   std::uint64_t id = 0;                  ///< the caller's; comes back in the decision
   std::chrono::nanoseconds timestamp{};  ///< rises
-  cv::Mat grey;                          ///< CV_8UC1, any size, the same for all frames
+  cv::Mat grey;                          ///< CV_8UC1, any size, the same for all frames; copied
 };
 
 struct FrameDecision {
@@ -74,7 +77,8 @@ struct FrameDecision {
 /// the others were not kept. Corners of the last keyframe are followed from frame to frame; a
 /// stretch begins with the first frame that has moved far enough and ends by motion, overlap or
 /// time. Every frame gets exactly one decision, at the latest when its stretch ends. Deterministic,
-/// thread-compatible. Holds the reduced images of one stretch. Used as
+/// thread-compatible. Holds the reduced images of one stretch; once memory for them is there, only
+/// a keyframe takes more. Used as
 ///
 ///     for (..) { for (const FrameDecision& decision : selector.offer(frame)) { .. } }
 ///     for (const FrameDecision& decision : selector.finish()) { .. }
@@ -83,18 +87,18 @@ class KeyframeSelector {
   /// kInvalidArgument: options.
   [[nodiscard]] static Result<KeyframeSelector> create(const KeyframeOptions& options);
 
-  /// Decisions in the order in which they became certain.
-  [[nodiscard]] std::vector<FrameDecision> offer(const VideoFrame& frame);
+  /// Decisions in the order in which they became certain; valid until the next call.
+  [[nodiscard]] std::span<const FrameDecision> offer(const VideoFrame& frame);
 
-  /// The end of the video: decides what is left, and begins anew.
-  [[nodiscard]] std::vector<FrameDecision> finish();
+  /// The end of the video: decides what is left, and begins anew. Valid until the next call.
+  [[nodiscard]] std::span<const FrameDecision> finish();
 
  private:
   /// A frame of the stretch or shortly before it, which may still become the keyframe.
   struct Candidate {
     std::uint64_t id = 0;
     std::chrono::nanoseconds timestamp{};
-    ImagePyramid pyramid;
+    std::shared_ptr<const ImagePyramid> pyramid;
     FrameMeasures measures;
     /// It has moved far enough, or is the first of all. The others are taken only for want of a
     /// sharp one.
@@ -110,8 +114,8 @@ class KeyframeSelector {
   void place_without_reference(Candidate candidate);
   void extend_stretch(Candidate candidate);
   void lose_track(Candidate candidate);
-  void follow_corners(const ImagePyramid& pyramid);
-  void measure_motion(FrameMeasures& measures) const;
+  void follow_corners(const std::shared_ptr<const ImagePyramid>& pyramid);
+  void measure_motion(FrameMeasures& measures);
   [[nodiscard]] bool has_moved(const Candidate& candidate) const;
   [[nodiscard]] bool ends_stretch(const FrameMeasures& measures) const;
   void forget_early_frames();
@@ -126,9 +130,11 @@ class KeyframeSelector {
 
   KeyframeOptions options_;
   cv::Size image_size_;
-  ImagePyramid last_pyramid_;  ///< of the last frame that was followed
-  std::deque<double> last_sharpness_;
-  std::deque<double> last_brightness_;
+  PyramidPool pyramids_;
+  std::shared_ptr<const ImagePyramid> last_pyramid_;  ///< of the last frame that was followed
+  std::vector<double> last_sharpness_;
+  std::vector<double> last_brightness_;
+  ViewChangeMeter view_change_;
   std::optional<std::chrono::nanoseconds> keyframe_time_;
   std::vector<Eigen::Vector2f> reference_;  ///< corners in the last keyframe
   /// Where they are in the last frame; nothing: lost for good.
@@ -137,8 +143,8 @@ class KeyframeSelector {
   double step_loss_ = 0.0;  ///< share of the corners lost in the last step
   /// Of the first frame that moved far enough; nothing: none has yet.
   std::optional<std::chrono::nanoseconds> stretch_begin_;
-  std::deque<Candidate> stretch_;         ///< begins `patience` before it
-  std::vector<FrameDecision> decisions_;  ///< not given out yet
+  std::vector<Candidate> stretch_;        ///< begins `patience` before it
+  std::vector<FrameDecision> decisions_;  ///< of this call
 };
 
 }  // namespace trigmesh

@@ -3,12 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <vector>
 
 #include <Eigen/Geometry>
 #include <Eigen/SVD>
-
-#include "firmware/base/check.hpp"
 
 namespace trigmesh {
 namespace {
@@ -24,28 +21,26 @@ double angle_between(const Vector3d& a, const Vector3d& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
-double median_deg(std::vector<double> angles) {
-  const auto middle = angles.begin() + static_cast<std::ptrdiff_t>(angles.size() / 2);
-  std::nth_element(angles.begin(), middle, angles.end());
-  return *middle * 180.0 / std::numbers::pi;
+}  // namespace
+
+void ViewChangeMeter::begin() {
+  rays_.clear();
 }
 
-std::vector<double> angles_after(const Matrix3d& rotation,
-                                 std::span<const Vector3d> first,
-                                 std::span<const Vector3d> second) {
-  std::vector<double> angles(first.size());
-  for (std::size_t i = 0; i < first.size(); ++i) {
-    angles[i] = angle_between(rotation * first[i], second[i]);
+void ViewChangeMeter::add(const Vector3d& first, const Vector3d& second) {
+  rays_.push_back({first, second});
+}
+
+void ViewChangeMeter::rotate(const Matrix3d& rotation) {
+  for (RayPair& ray : rays_) {
+    ray.angle = angle_between(rotation * ray.first, ray.second);
   }
-  return angles;
 }
 
-Matrix3d weighted_rotation(std::span<const Vector3d> first,
-                           std::span<const Vector3d> second,
-                           std::span<const double> angles) {
+Matrix3d ViewChangeMeter::weighted_rotation() const {
   Matrix3d moments = Matrix3d::Zero();
-  for (std::size_t i = 0; i < first.size(); ++i) {
-    moments += second[i] * first[i].transpose() / std::max(angles[i], kSmallestAngle);
+  for (const RayPair& ray : rays_) {
+    moments += ray.second * ray.first.transpose() / std::max(ray.angle, kSmallestAngle);
   }
   const Eigen::JacobiSVD<Matrix3d> svd(moments, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant();
@@ -53,20 +48,27 @@ Matrix3d weighted_rotation(std::span<const Vector3d> first,
          svd.matrixV().transpose();
 }
 
-}  // namespace
+double ViewChangeMeter::median_angle_deg() {
+  angles_.clear();
+  for (const RayPair& ray : rays_) {
+    angles_.push_back(ray.angle);
+  }
+  const auto middle = angles_.begin() + static_cast<std::ptrdiff_t>(angles_.size() / 2);
+  std::nth_element(angles_.begin(), middle, angles_.end());
+  return *middle * 180.0 / std::numbers::pi;
+}
 
-ViewChange view_change(std::span<const Vector3d> first, std::span<const Vector3d> second) {
-  TM_CHECK(first.size() == second.size());
-  if (first.size() < 3) {
+ViewChange ViewChangeMeter::measure() {
+  if (rays_.size() < 3) {
     return {};
   }
-  std::vector<double> angles = angles_after(Matrix3d::Identity(), first, second);
   ViewChange change;
-  change.motion_deg = median_deg(angles);
+  rotate(Matrix3d::Identity());
+  change.motion_deg = median_angle_deg();
   for (int i = 0; i < kReweightings; ++i) {
-    angles = angles_after(weighted_rotation(first, second, angles), first, second);
+    rotate(weighted_rotation());
   }
-  change.parallax_deg = median_deg(std::move(angles));
+  change.parallax_deg = median_angle_deg();
   return change;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
-#include <span>
+#include <cstddef>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -12,11 +13,35 @@ struct ViewChange {
   double parallax_deg = 0.0;  ///< the same after the best rotation: a lower bound of the parallax
 };
 
-/// From the rays (unit vectors in the camera's frame) to each corner in both views. The rotation
-/// minimises the sum of the angles (reweighted least squares of Kabsch's solution, Acta Cryst. A32,
-/// 1976), so that a near thing does not spoil it. Fewer than 3 rays: zero. Precondition: as many
-/// rays in both.
-[[nodiscard]] ViewChange view_change(std::span<const Eigen::Vector3d> first,
-                                     std::span<const Eigen::Vector3d> second);
+/// Measures it from the rays to each corner in both views. The rotation minimises the sum of the
+/// angles (reweighted least squares of Kabsch's solution, Acta Cryst. A32, 1976), so that a near
+/// thing does not spoil it. Its memory is used again. Thread-compatible.
+class ViewChangeMeter {
+ public:
+  /// Forgets the rays of the views before.
+  void begin();
+
+  /// Unit vectors in the frames of the two cameras, to the same corner.
+  void add(const Eigen::Vector3d& first, const Eigen::Vector3d& second);
+
+  [[nodiscard]] std::size_t ray_count() const { return rays_.size(); }
+
+  /// Zero with fewer than 3 rays.
+  [[nodiscard]] ViewChange measure();
+
+ private:
+  struct RayPair {
+    Eigen::Vector3d first;
+    Eigen::Vector3d second;
+    double angle = 0.0;  ///< after the rotation found last, radians
+  };
+
+  void rotate(const Eigen::Matrix3d& rotation);
+  [[nodiscard]] Eigen::Matrix3d weighted_rotation() const;
+  [[nodiscard]] double median_angle_deg();
+
+  std::vector<RayPair> rays_;
+  std::vector<double> angles_;  ///< to take a median of
+};
 
 }  // namespace trigmesh

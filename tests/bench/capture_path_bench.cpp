@@ -99,26 +99,39 @@ std::vector<Camera> camera_that_walks(Picture picture) {
   return pictures;
 }
 
-/// Runs `use(frame, sequence)` and counts.
+/// What frames of one kind took.
+struct Allocations {
+  std::uint64_t frames = 0;
+  std::uint64_t count = 0;
+
+  void report(benchmark::State& state, const char* name) const {
+    if (frames > 0 && conformance::allocations_of_this_thread()) {
+      state.counters[name] = static_cast<double>(count) / static_cast<double>(frames);
+    }
+  }
+};
+
+/// Runs `use(frame, sequence)`, which tells whether a frame was kept, and counts.
 template <typename Use>
 void measure(benchmark::State& state, std::vector<Camera> pictures, Use use) {
   std::uint64_t sequence = 0;
   const auto next = [&] {
     Camera& camera = pictures[sequence % pictures.size()];
-    use(camera.frame(), sequence++);
+    return use(camera.frame(), sequence++);
   };
-  while (sequence < 64) {  // every buffer has held a frame once
-    next();
+  while (sequence < 200) {  // every buffer has held a frame once
+    (void)next();
   }
-  const auto before = conformance::allocations_of_this_thread();
+  Allocations kept;
+  Allocations not_kept;
   for (auto _ : state) {
-    next();
+    const std::uint64_t before = conformance::allocations_of_this_thread().value_or(0);
+    Allocations& kind = next() ? kept : not_kept;
+    ++kind.frames;
+    kind.count += conformance::allocations_of_this_thread().value_or(0) - before;
   }
-  const auto after = conformance::allocations_of_this_thread();
-  if (before && after) {
-    state.counters["allocations_per_frame"] = benchmark::Counter(
-        static_cast<double>(*after - *before), benchmark::Counter::kAvgIterations);
-  }
+  kept.report(state, "allocations_when_kept");
+  not_kept.report(state, "allocations_when_not");
   state.counters["frame_bytes"] = static_cast<double>(pictures.front().size_bytes());
 }
 
@@ -134,32 +147,36 @@ void hold_last_frames(benchmark::State& state) {
           camera_that_stands(picture_of(state)),
           [&](const Frame& frame, std::uint64_t sequence) {
             TM_CHECK(shelf.offer(frame, at(sequence), sequence));
+            return false;
           });
 }
 
-/// Video mode: the sharpest of five is chosen; nothing is stored.
+/// Video mode: frames are chosen; nothing is stored.
+void offer_frames(benchmark::State& state, StreamSelector& selector, std::vector<Camera> pictures) {
+  selector.begin({});
+  StreamChoice choice;
+  measure(state, std::move(pictures), [&](const Frame& frame, std::uint64_t sequence) {
+    selector.offer(frame, at(sequence), sequence, choice);
+    const bool is_kept = !choice.kept.empty();
+    choice.kept.clear();
+    choice.judged.clear();
+    return is_kept;
+  });
+}
+
+/// The sharpest of five is chosen.
 void choose_among_frames(benchmark::State& state) {
   FrameCopies copies(16);
   SharpestOfGroup selector(5, copies);
-  selector.begin({});
-  measure(state,
-          camera_that_stands(picture_of(state)),
-          [&](const Frame& frame, std::uint64_t sequence) {
-            benchmark::DoNotOptimize(selector.offer(frame, at(sequence), sequence));
-          });
+  offer_frames(state, selector, camera_that_stands(picture_of(state)));
 }
 
-/// Video mode, keyframes: corners are followed and a verdict is given on each frame; nothing is
-/// stored.
+/// Keyframes: corners are followed and a verdict is given on each frame.
 void select_keyframes(benchmark::State& state) {
   const KeyframeOptions options;
   FrameCopies copies(keyframe_copies(options, milliseconds(33)) + 2);
   KeyframeStream selector(options, copies);
-  selector.begin({});
-  measure(
-      state, camera_that_walks(picture_of(state)), [&](const Frame& frame, std::uint64_t sequence) {
-        benchmark::DoNotOptimize(selector.offer(frame, at(sequence), sequence));
-      });
+  offer_frames(state, selector, camera_that_walks(picture_of(state)));
 }
 
 /// A frame that is kept: encoded if it is raw, hashed, written, fsynced, in the journal.
@@ -178,6 +195,7 @@ void store_frame(benchmark::State& state) {
           [&](const Frame& frame, std::uint64_t sequence) {
             const TimedFrame timed{copies.copy(frame, sequence), at(sequence), sequence};
             TM_CHECK(store.add_frame(timed).has_value());
+            return true;
           });
 }
 

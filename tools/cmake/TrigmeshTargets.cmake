@@ -109,13 +109,6 @@ function(trigmesh_add_library)
 endfunction()
 
 # Names of tests tell the sanitizer, so that several builds can be run as one (tests/suites.cmake).
-set(thread_folders
-  "${CMAKE_SOURCE_DIR}/tests/conformance"
-  "${CMAKE_SOURCE_DIR}/tests/unit/drivers/camera"
-  "${CMAKE_SOURCE_DIR}/tests/unit/drivers/trigger"
-  "${CMAKE_SOURCE_DIR}/tests/unit/firmware/base"
-  "${CMAKE_SOURCE_DIR}/tests/unit/firmware/daemon"
-  "${CMAKE_SOURCE_DIR}/tests/unit/firmware/pipeline")
 set(test_prefix "")
 set(test_environment "")
 if(TRIGMESH_SANITIZE MATCHES "address")
@@ -127,6 +120,7 @@ elseif(TRIGMESH_SANITIZE MATCHES "thread")
 endif()
 
 # What tools/run-tests builds with sanitizers: parts of the tests only.
+include("${CMAKE_SOURCE_DIR}/tests/thread_folders.cmake")
 add_custom_target(trigmesh_unit_tests)
 add_custom_target(trigmesh_thread_tests)
 add_custom_target(trigmesh_fuzzers)
@@ -150,6 +144,7 @@ function(trigmesh_add_test)
   if("${ARG_LABEL}" MATCHES "^(unit|conformance)$")
     add_dependencies(trigmesh_unit_tests ${ARG_NAME})
     foreach(folder IN LISTS thread_folders)
+      set(folder "${CMAKE_SOURCE_DIR}/${folder}")
       cmake_path(IS_PREFIX folder "${CMAKE_CURRENT_SOURCE_DIR}" has_threads)
       if(has_threads)
         add_dependencies(trigmesh_thread_tests ${ARG_NAME})

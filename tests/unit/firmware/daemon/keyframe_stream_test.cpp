@@ -55,14 +55,30 @@ class KeyframeStreamTest : public ::testing::Test {
   void walk(KeyframeStream& stream, int frames, int step_px) {
     Pan pan(frames * step_px);
     for (int i = 0; i < frames; ++i) {
-      use(stream.offer(pan.at(i * step_px),
-                       test_support::at(kInterval * (i + 1)),
-                       static_cast<std::uint64_t>(i)));
+      offer(stream,
+            pan.at(i * step_px),
+            test_support::at(kInterval * (i + 1)),
+            static_cast<std::uint64_t>(i));
     }
-    use(stream.end());
+    end(stream);
   }
 
-  void use(StreamChoice choice) {
+  void offer(KeyframeStream& stream,
+             const Frame& frame,
+             const FrameTimes& times,
+             std::uint64_t sequence) {
+    StreamChoice choice;
+    stream.offer(frame, times, sequence, choice);
+    use(choice);
+  }
+
+  void end(KeyframeStream& stream) {
+    StreamChoice choice;
+    stream.end(choice);
+    use(choice);
+  }
+
+  void use(const StreamChoice& choice) {
     for (const TimedFrame& frame : choice.kept) {
       kept_.push_back(frame.sequence);
     }
@@ -139,15 +155,14 @@ TEST_F(KeyframeStreamTest, DamagedFramesAndTimesThatDoNotRiseAreCounted) {
   KeyframeStream stream({}, copies_);
   stream.begin(milliseconds(0));
   Pan pan(10);
-  use(stream.offer(pan.at(0), test_support::at(milliseconds(50)), 0));
-  use(stream.offer(pan.at(3), test_support::at(milliseconds(50)), 1));
+  offer(stream, pan.at(0), test_support::at(milliseconds(50)), 0);
+  offer(stream, pan.at(3), test_support::at(milliseconds(50)), 1);
   auto pool = std::make_shared<SlotPool>(1, nullptr);
   const std::size_t slot = *pool->take();
   FrameInfo info;
   info.layout.format = PixelFormat::kJpeg;
-  use(stream.offer(
-      Frame(info, pool->bytes(slot), pool, slot), test_support::at(milliseconds(90)), 2));
-  use(stream.end());
+  offer(stream, Frame(info, pool->bytes(slot), pool, slot), test_support::at(milliseconds(90)), 2);
+  end(stream);
   EXPECT_EQ(stream.counts().damaged, 2U);
   EXPECT_THAT(kept_, ElementsAre(0));
 }

@@ -18,15 +18,14 @@ using ::testing::ElementsAre;
 std::vector<std::uint64_t> kept(SharpestOfGroup& selector, const std::vector<int>& contrasts) {
   test_support::TestFrames frames;
   std::vector<std::uint64_t> sequences;
+  StreamChoice choice;
   for (std::uint64_t i = 0; i < contrasts.size(); ++i) {
     const Frame frame = frames.make(static_cast<std::uint8_t>(contrasts[i]));
-    for (const TimedFrame& one :
-         selector.offer(frame, test_support::at(i * milliseconds(10)), i).kept) {
-      sequences.push_back(one.sequence);
-    }
+    selector.offer(frame, test_support::at(i * milliseconds(10)), i, choice);
   }
-  for (const TimedFrame& last : selector.end().kept) {
-    sequences.push_back(last.sequence);
+  selector.end(choice);
+  for (const TimedFrame& one : choice.kept) {
+    sequences.push_back(one.sequence);
   }
   return sequences;
 }
@@ -96,9 +95,11 @@ TEST(SharpestOfGroup, CountsDamagedFrames) {
   FrameInfo info;
   info.layout.format = PixelFormat::kJpeg;
   const Frame damaged(info, pool->bytes(slot), pool, slot);
-  EXPECT_TRUE(selector.offer(damaged, test_support::at(milliseconds(1)), 1).kept.empty());
+  StreamChoice choice;
+  selector.offer(damaged, test_support::at(milliseconds(1)), 1, choice);
   EXPECT_EQ(selector.counts().damaged, 1U);
-  EXPECT_TRUE(selector.end().kept.empty());
+  selector.end(choice);
+  EXPECT_TRUE(choice.kept.empty());
 }
 
 }  // namespace

@@ -25,25 +25,28 @@ class CornerTracker : public ::testing::Test {
   /// Largest error over the corners that were followed, but for those whose patch reaches over the
   /// border of the first image, behind which the second one is made up.
   double largest_error(const cv::Mat& second, const Vector2f& shift) {
-    const auto tracked = track_corners(build_pyramid(first_, options_.levels),
-                                       build_pyramid(second, options_.levels),
-                                       corners_,
-                                       {},
-                                       options_);
+    const ImagePyramid from = pyramid_of(first_);
+    const ImagePyramid to = pyramid_of(second);
     double largest = 0.0;
     followed_ = 0;
-    for (std::size_t i = 0; i < corners_.size(); ++i) {
-      if (tracked[i].has_value()) {
+    for (const Vector2f& corner : corners_) {
+      if (const auto tracked = track_corner(from, to, corner, options_)) {
         ++followed_;
-        const Vector2f from_centre = (corners_[i] - Vector2f(160.0F, 120.0F)).cwiseAbs();
+        const Vector2f from_centre = (corner - Vector2f(160.0F, 120.0F)).cwiseAbs();
         if (from_centre.x() > 140.0F || from_centre.y() > 100.0F) {
           continue;
         }
-        const Vector2f error = *tracked[i] - corners_[i] - shift;
+        const Vector2f error = *tracked - corner - shift;
         largest = std::max(largest, static_cast<double>(error.norm()));
       }
     }
     return largest;
+  }
+
+  [[nodiscard]] ImagePyramid pyramid_of(const cv::Mat& grey) const {
+    ImagePyramid pyramid = {grey};
+    build_halves(options_.levels, pyramid);
+    return pyramid;
   }
 
   const CornerTrackerOptions options_{};
@@ -93,16 +96,11 @@ TEST_F(CornerTracker, FollowsNothingIntoAnotherPicture) {
 }
 
 TEST_F(CornerTracker, LosesWhatLeavesTheImage) {
-  const std::vector<Vector2f> corners = {{2.0F, 100.0F}, {-5.0F, 10.0F}, {400.0F, 300.0F}};
-  const ImagePyramid pyramid = build_pyramid(first_, options_.levels);
-  for (const auto& place : track_corners(pyramid, pyramid, corners, {}, options_)) {
-    EXPECT_FALSE(place.has_value());
+  const ImagePyramid pyramid = pyramid_of(first_);
+  for (const Vector2f& corner :
+       {Vector2f(2.0F, 100.0F), Vector2f(-5.0F, 10.0F), Vector2f(400.0F, 300.0F)}) {
+    EXPECT_FALSE(track_corner(pyramid, pyramid, corner, options_).has_value());
   }
-}
-
-TEST_F(CornerTracker, StopsThePyramidAtSmallImages) {
-  EXPECT_EQ(build_pyramid(first_, 6).size(), 4U);  // 240, 120, 60, 30; the next: 15
-  EXPECT_EQ(build_pyramid(cv::Mat::zeros(10, 10, CV_8UC1), 3).size(), 1U);
 }
 
 TEST(CornerTrackerOptions, NamesWhatIsWrong) {

@@ -1,6 +1,7 @@
 #include "sfm/keyframes/keyframe_selector.hpp"
 
 #include <map>
+#include <span>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -72,7 +73,7 @@ class KeyframeSelectorTest : public ::testing::Test {
     return passed;
   }
 
-  void take(const std::vector<FrameDecision>& decisions) {
+  void take(std::span<const FrameDecision> decisions) {
     for (const FrameDecision& decision : decisions) {
       const bool is_new = decisions_.emplace(decision.id, decision).second;
       EXPECT_TRUE(is_new) << "frame " << decision.id << " was decided twice";

@@ -29,13 +29,11 @@ std::vector<Vector3d> points_in_view() {
 }
 
 ViewChange change_after(const Matrix3d& rotation, const Vector3d& translation) {
-  std::vector<Vector3d> first;
-  std::vector<Vector3d> second;
+  ViewChangeMeter meter;
   for (const Vector3d& point : points_in_view()) {
-    first.push_back(point.normalized());
-    second.push_back((rotation * point + translation).normalized());
+    meter.add(point.normalized(), (rotation * point + translation).normalized());
   }
-  return view_change(first, second);
+  return meter.measure();
 }
 
 TEST(ViewChange, SeesNothingWhereNothingMoves) {
@@ -63,21 +61,30 @@ TEST(ViewChange, BoundsTheParallaxFromBelow) {
 }
 
 TEST(ViewChange, IsNotMovedByAFewWrongRays) {
-  std::vector<Vector3d> first;
-  std::vector<Vector3d> second;
+  ViewChangeMeter meter;
   for (const Vector3d& point : points_in_view()) {
-    first.push_back(point.normalized());
-    second.push_back(point.normalized());
+    const bool is_wrong = meter.ray_count() < 40;
+    meter.add(point.normalized(),
+              is_wrong ? Vector3d(0.5, 0.5, 1.0).normalized() : point.normalized());
   }
-  for (std::size_t i = 0; i < 40; ++i) {
-    second[i] = Vector3d(0.5, 0.5, 1.0).normalized();
-  }
-  EXPECT_LT(view_change(first, second).parallax_deg, 0.02);
+  EXPECT_LT(meter.measure().parallax_deg, 0.02);
 }
 
 TEST(ViewChange, SaysNothingOfTwoRays) {
-  const std::vector<Vector3d> rays(2, Vector3d::UnitZ());
-  EXPECT_EQ(view_change(rays, rays).motion_deg, 0.0);
+  ViewChangeMeter meter;
+  meter.add(Vector3d::UnitZ(), Vector3d::UnitX());
+  meter.add(Vector3d::UnitZ(), Vector3d::UnitX());
+  EXPECT_EQ(meter.measure().motion_deg, 0.0);
+}
+
+TEST(ViewChange, BeginsAnew) {
+  ViewChangeMeter meter;
+  for (int i = 0; i < 3; ++i) {
+    meter.add(Vector3d::UnitZ(), Vector3d::UnitX());
+  }
+  EXPECT_NEAR(meter.measure().motion_deg, 90.0, 1e-9);
+  meter.begin();
+  EXPECT_EQ(meter.ray_count(), 0U);
 }
 
 }  // namespace
