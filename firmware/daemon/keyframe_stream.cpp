@@ -16,8 +16,8 @@ KeyframeSelector valid_selector(const KeyframeOptions& options) {
 
 }  // namespace
 
-std::size_t keyframe_copies(const KeyframeOptions& options,
-                            std::chrono::nanoseconds frame_interval) {
+std::size_t most_waiting_keyframes(const KeyframeOptions& options,
+                                   std::chrono::nanoseconds frame_interval) {
   // A stretch, and what is looked through before and after it for a sharper frame.
   const std::chrono::nanoseconds longest = options.stretch + 2 * options.patience;
   return static_cast<std::size_t>(longest / frame_interval) + 3;

@@ -13,7 +13,7 @@
 namespace trigmesh {
 
 /// Keeps the keyframes of a stream (sfm/keyframes), with a verdict on every frame that it could
-/// look at. Holds copies of the frames that may still become one: keyframe_copies() tells how many.
+/// look at. Holds copies of the frames that may still become one, at most options.max_waiting.
 /// Thread-compatible.
 class KeyframeStream final : public StreamSelector {
  public:
@@ -46,8 +46,9 @@ class KeyframeStream final : public StreamSelector {
   StreamCounts counts_;
 };
 
-/// Most frames that wait for a decision at a time, when they come at this interval (> 0).
-[[nodiscard]] std::size_t keyframe_copies(const KeyframeOptions& options,
-                                          std::chrono::nanoseconds frame_interval);
+/// Most frames that wait for a decision at a time, when they come at this interval (> 0) and there
+/// is room for all: for KeyframeOptions::max_waiting.
+[[nodiscard]] std::size_t most_waiting_keyframes(const KeyframeOptions& options,
+                                                 std::chrono::nanoseconds frame_interval);
 
 }  // namespace trigmesh

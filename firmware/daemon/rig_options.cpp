@@ -63,7 +63,7 @@ std::size_t frames_until_heard(const Settings& settings) {
 /// Copies that a selector of frames holds: the best of a group and its successor, or all that may
 /// still become keyframes.
 std::size_t selector_copies(const CaptureOptions& options) {
-  return options.group_size == 0 ? keyframe_copies(options.keyframes, options.frame_interval) : 2;
+  return options.group_size == 0 ? options.keyframes.max_waiting : 2;
 }
 
 /// What the selector of keyframes has to know of the lens. A profile that cannot be read is told by
@@ -81,6 +81,7 @@ CaptureOptions capture_options(const Settings& settings, const std::string& prof
   CaptureOptions options;
   options.keyframes = keyframe_options(profile);
   options.frame_interval = nanoseconds(std::chrono::seconds(1)) / settings.camera.rate_hz;
+  options.keyframes.max_waiting = most_waiting_keyframes(options.keyframes, options.frame_interval);
   options.stills.wait = settings.capture.still_wait;
   options.stills.history = 0;
   if (settings.capture.mode == CaptureSettings::Mode::kStill) {

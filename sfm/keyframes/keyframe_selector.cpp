@@ -81,6 +81,7 @@ Result<> KeyframeOptions::validate() const {
   TM_RETURN_IF_ERROR(check_range("min_relative_sharpness", min_relative_sharpness, 0.0, 0.99));
   TM_RETURN_IF_ERROR(check_range("max_step_loss", max_step_loss, 0.01, 0.99));
   TM_RETURN_IF_ERROR(check_range("max_brightness_ratio", max_brightness_ratio, 1.001, 100.0));
+  TM_RETURN_IF_ERROR(check_range("max_waiting", static_cast<double>(max_waiting), 2, 10000));
   if (slow_interval.count() <= 0 || stretch.count() <= 0 || min_interval.count() < 0) {
     return fail(ErrorCode::kInvalidArgument,
                 "slow_interval and stretch must be more than 0 and min_interval not negative");
@@ -191,9 +192,13 @@ void KeyframeSelector::place_without_reference(Candidate candidate) {
     stretch_begin_ = candidate.timestamp;
   }
   stretch_.push_back(std::move(candidate));
-  if (stretch_.back().timestamp - *stretch_begin_ >= options_.stretch) {
+  if (stretch_.back().timestamp - *stretch_begin_ >= options_.stretch || is_full()) {
     close_stretch();
   }
+}
+
+bool KeyframeSelector::is_full() const {
+  return stretch_.size() >= options_.max_waiting;
 }
 
 void KeyframeSelector::extend_stretch(Candidate candidate) {
@@ -209,25 +214,28 @@ void KeyframeSelector::extend_stretch(Candidate candidate) {
     stretch_begin_ = candidate.timestamp;
   }
   stretch_.push_back(std::move(candidate));
+  forget_early_frames();
   if (!stretch_begin_.has_value()) {
-    forget_early_frames();
     return;
   }
   const bool is_over = stretch_.back().timestamp - *stretch_begin_ >= options_.stretch;
-  if ((is_last || is_over) && !may_wait(stretch_.back().measures)) {
+  if (is_full() || ((is_last || is_over) && !may_wait(stretch_.back().measures))) {
     close_stretch();
   }
 }
 
+/// Those from before the stretch: when none has begun for long, or for want of room.
 void KeyframeSelector::forget_early_frames() {
-  const std::chrono::nanoseconds earliest = stretch_.back().timestamp - options_.patience;
-  const auto first = std::find_if(stretch_.begin(), stretch_.end(), [&](const Candidate& one) {
-    return one.timestamp >= earliest;
-  });
-  for (auto early = stretch_.begin(); early != first; ++early) {
-    decide(*early, early->refusal);
+  std::size_t early = 0;
+  const auto may_go = [&](const Candidate& candidate) {
+    const std::chrono::nanoseconds age = stretch_.back().timestamp - candidate.timestamp;
+    const bool is_old = !stretch_begin_.has_value() && age > options_.patience;
+    return !candidate.is_wanted && (is_old || stretch_.size() - early >= options_.max_waiting);
+  };
+  for (; early < stretch_.size() && may_go(stretch_[early]); ++early) {
+    decide(stretch_[early], stretch_[early].refusal);
   }
-  stretch_.erase(stretch_.begin(), first);
+  stretch_.erase(stretch_.begin(), stretch_.begin() + static_cast<std::ptrdiff_t>(early));
 }
 
 /// Whether it is worth and safe to wait for a sharper frame.

@@ -52,6 +52,9 @@ struct KeyframeOptions {
   double max_step_loss = 0.6;
   /// Brighter or darker than the last frames by this factor: a jump. > 1.
   double max_brightness_ratio = 1.6;
+  /// At most so many frames wait for a decision; when they are there, those from before the stretch
+  /// are decided early, then the stretch ends. [2, 10000].
+  std::size_t max_waiting = 256;
   CornerTrackerOptions tracker;
 
   [[nodiscard]] Result<> validate() const;
@@ -76,7 +79,8 @@ struct FrameDecision {
 /// Keeps the sharpest frame of each stretch of a video with enough motion and overlap, and says why
 /// the others were not kept. Corners of the last keyframe are followed from frame to frame; a
 /// stretch begins with the first frame that has moved far enough and ends by motion, overlap or
-/// time. Every frame gets exactly one decision, at the latest when its stretch ends. Deterministic,
+/// time, or by `max_waiting`. Every frame gets exactly one decision, at the latest when its stretch
+/// ends. Deterministic,
 /// thread-compatible. Holds the reduced images of one stretch; once memory for them is there, only
 /// a keyframe takes more. Used as
 ///
@@ -119,6 +123,7 @@ class KeyframeSelector {
   [[nodiscard]] bool has_moved(const Candidate& candidate) const;
   [[nodiscard]] bool ends_stretch(const FrameMeasures& measures) const;
   void forget_early_frames();
+  [[nodiscard]] bool is_full() const;
   [[nodiscard]] bool may_wait(const FrameMeasures& measures) const;
   [[nodiscard]] std::size_t sharpest_wanted() const;
   [[nodiscard]] std::size_t choose_keyframe() const;

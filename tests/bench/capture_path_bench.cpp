@@ -173,8 +173,9 @@ void choose_among_frames(benchmark::State& state) {
 
 /// Keyframes: corners are followed and a verdict is given on each frame.
 void select_keyframes(benchmark::State& state) {
-  const KeyframeOptions options;
-  FrameCopies copies(keyframe_copies(options, milliseconds(33)) + 2);
+  KeyframeOptions options;
+  options.max_waiting = most_waiting_keyframes(options, milliseconds(33));
+  FrameCopies copies(options.max_waiting + 2);
   KeyframeStream selector(options, copies);
   offer_frames(state, selector, camera_that_walks(picture_of(state)));
 }

@@ -76,7 +76,7 @@ class StreamMemory : public ::testing::Test {
     }
   }
 
-  FrameCopies copies_{keyframe_copies({}, kInterval)};
+  FrameCopies copies_{most_waiting_keyframes({}, kInterval)};
 };
 
 TEST_F(StreamMemory, KeyframesTakeItOnly) {

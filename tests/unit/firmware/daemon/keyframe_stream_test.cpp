@@ -57,7 +57,7 @@ class KeyframeStreamTest : public ::testing::Test {
     for (int i = 0; i < frames; ++i) {
       offer(stream,
             pan.at(i * step_px),
-            test_support::at(kInterval * (i + 1)),
+            test_support::at(interval_ * (i + 1)),
             static_cast<std::uint64_t>(i));
     }
     end(stream);
@@ -85,7 +85,8 @@ class KeyframeStreamTest : public ::testing::Test {
     judged_.insert(judged_.end(), choice.judged.begin(), choice.judged.end());
   }
 
-  FrameCopies copies_{keyframe_copies({}, kInterval)};
+  FrameCopies copies_{most_waiting_keyframes({}, kInterval)};
+  std::chrono::nanoseconds interval_ = kInterval;
   std::vector<std::uint64_t> kept_;
   std::vector<FrameJudged> judged_;
 };
@@ -149,6 +150,17 @@ TEST_F(KeyframeStreamTest, TheCopiesThatAreAskedForAreEnough) {
     walk(stream, 60, step_px);
     EXPECT_EQ(stream.counts().no_buffer, 0U) << step_px << " pixels a frame";
   }
+}
+
+TEST_F(KeyframeStreamTest, ACameraThatIsFasterThanExpectedIsFollowedToo) {
+  KeyframeOptions options;
+  options.max_waiting = copies_.capacity();
+  KeyframeStream stream(options, copies_);
+  stream.begin(milliseconds(0));
+  interval_ = kInterval / 8;
+  walk(stream, 480, 1);
+  EXPECT_EQ(stream.counts().no_buffer, 0U);
+  EXPECT_GE(stream.counts().kept, 4U);
 }
 
 TEST_F(KeyframeStreamTest, DamagedFramesAndTimesThatDoNotRiseAreCounted) {

@@ -155,6 +155,20 @@ TEST_F(KeyframeSelectorTest, PassesOverNoSharpFrameForABlurredOne) {
   EXPECT_GT(blurred_keyframes, 0U);
 }
 
+TEST_F(KeyframeSelectorTest, HoldsNoMoreFramesThanAllowed) {
+  KeyframeOptions options;
+  options.max_waiting = 4;
+  selector_ = KeyframeSelector::create(options).value();
+  for (const double step_px : {0.5, 0.0, 3.0}) {
+    for (int i = 0; i < 60; ++i) {
+      offer(view_at(step_px * i));
+      EXPECT_LT(next_id_ - decisions_.size(), 4U) << "steps of " << step_px << " pixels";
+    }
+  }
+  finish();
+  EXPECT_GE(frames_with(FrameVerdict::kKept).size(), 4U);
+}
+
 TEST_F(KeyframeSelectorTest, LeavesOutAFlash) {
   for (int i = 0; i < 60; ++i) {
     cv::Mat view = view_at(3.0 * i);
