@@ -72,7 +72,7 @@ class ModelMaker {
   virtual void begin(Session session) = 0;
 
   /// News of a capture. Returns at once; whoever does not map while it is captured need not listen.
-  virtual void follow(CaptureNews news) { (void)news; }
+  virtual void follow(CaptureNews /*news*/) {}
 
   /// Asks it to stop soon: answered by kCancelled, or by what came first. Nothing when idle.
   virtual void request_stop() = 0;
