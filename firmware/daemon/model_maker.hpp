@@ -71,8 +71,8 @@ class ModelMaker {
   /// last state stays what it was when it is cancelled. Precondition: every begin() was answered.
   virtual void begin(Session session) = 0;
 
-  /// News of a capture. Returns at once; whoever does not map while it is captured need not listen.
-  virtual void follow(CaptureNews /*news*/) {}
+  /// News of a capture. Returns at once.
+  virtual void follow(CaptureNews news) = 0;
 
   /// Asks it to stop soon: answered by kCancelled, or by what came first. Nothing when idle.
   virtual void request_stop() = 0;

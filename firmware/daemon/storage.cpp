@@ -126,7 +126,7 @@ void Storage::disk_failed(const Error& error) {
   report(StorageLevel::kFull, 0);
 }
 
-void Storage::do_order(OpenSessionOrder order) {
+void Storage::do_order(const OpenSessionOrder& order) {
   serial_ = order.serial;
   if (!store_.is_open()) {
     open_store();  // perhaps it is back
@@ -288,7 +288,7 @@ void Storage::do_order(UndoOrder order) {
   }
 }
 
-void Storage::do_order(CloseOrder order) {
+void Storage::do_order(const CloseOrder& order) {
   if (!is_current(order.serial)) {
     return;
   }

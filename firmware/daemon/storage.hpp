@@ -54,21 +54,21 @@ class Storage {
   /// Reading or writing failed: the session ends here, and the disk is tried again later.
   void disk_failed(const Error& error);
 
-  void do_order(OpenSessionOrder order);
+  void do_order(const OpenSessionOrder& order);
   [[nodiscard]] Result<std::string> open_session(const OpenSessionOrder& order);
   void do_order(RecordOrder order);
   void do_order(StreamFrameOrder order);
   void do_order(StillFrameOrder order);
   void do_order(StreamDoneOrder order);
   void do_order(UndoOrder order);
-  void do_order(CloseOrder order);
+  void do_order(const CloseOrder& order);
   void do_order(BeginModelOrder order);
   void do_order(StopModelOrder order);
   void do_order(ModelEndedOrder order);
-  void do_order(ListOrder order);
+  void do_order(const ListOrder& order);
   void do_order(RemoveOrder order);
   void do_order(BeginExportOrder order);
-  void do_order(EndExportOrder order);
+  void do_order(const EndExportOrder& order);
 
   [[nodiscard]] Result<std::uint32_t> store_frame(const TimedFrame& timed);
   void refuse(const TimedFrame& timed, const Error& error);

@@ -36,7 +36,7 @@ void Storage::do_order(ModelEndedOrder order) {
   check_level();  // models take space, too
 }
 
-void Storage::do_order(ListOrder order) {
+void Storage::do_order(const ListOrder& order) {
   order.answer(store_.is_open() ? store_.store().list()
                                 : fail(ErrorCode::kIo, "{}", parts_.faults.text_of("storage")));
 }
@@ -84,7 +84,7 @@ void Storage::do_order(BeginExportOrder order) {
   order.answer(store_.store().folder_of(order.id));
 }
 
-void Storage::do_order(EndExportOrder order) {
+void Storage::do_order(const EndExportOrder& order) {
   export_id_.clear();
   if (order.end == ExportEnd::kFailed || !store_.is_open()) {
     order.answer({});

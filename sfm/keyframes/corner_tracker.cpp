@@ -38,7 +38,7 @@ bool sample_patch(const cv::Mat& image, const Vector2f& centre, int radius, Patc
   const float a = left - static_cast<float>(column);
   const float b = top - static_cast<float>(row);
   const std::array<float, 4> weights = {(1 - a) * (1 - b), a * (1 - b), (1 - a) * b, a * b};
-  patch.resize(side * side);
+  patch.resize(Eigen::Index{side} * side);
   float* pixels = patch.data();
   for (int y = 0; y < side; ++y) {
     const std::uint8_t* upper = image.ptr<std::uint8_t>(row + y) + column;
@@ -68,13 +68,13 @@ void subtract_mean(PatchPixels& pixels) {
 
 /// Values and central differences from the patch with its border.
 void split_border(const PatchPixels& bordered, int radius, Template& patch) {
-  const int side = 2 * radius + 1;
-  const int stride = side + 2;
+  const Eigen::Index side = 2 * radius + 1;
+  const Eigen::Index stride = side + 2;
   for (PatchPixels* part : {&patch.values, &patch.gradient_x, &patch.gradient_y}) {
     part->resize(side * side);
   }
-  for (int y = 0; y < side; ++y) {
-    const int from = (y + 1) * stride + 1;
+  for (Eigen::Index y = 0; y < side; ++y) {
+    const Eigen::Index from = (y + 1) * stride + 1;
     patch.values.segment(y * side, side) = bordered.segment(from, side);
     patch.gradient_x.segment(y * side, side) =
         0.5F * (bordered.segment(from + 1, side) - bordered.segment(from - 1, side));

@@ -27,8 +27,8 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr int kWalk_px = 320;  // there and back, in the steps below
-constexpr int kStep_px = 8;
+constexpr int kWalk = 320;  // pixels there and back, in the steps below
+constexpr int kStep = 8;
 
 enum Picture : int { kYuyv640x480, kMjpg1280x720 };
 
@@ -37,7 +37,7 @@ cv::Mat textured(int width, int height, int channels, int shift_px) {
   cv::RNG random(3);
   cv::Mat picture(height, width, CV_8UC(channels), cv::Scalar::all(120));
   for (int i = 0; i < 3000; ++i) {
-    const int x = random.uniform(-kWalk_px, width);
+    const int x = random.uniform(-kWalk, width);
     const cv::Rect square(x + shift_px, random.uniform(0, height), 24, 24);
     const cv::Scalar colour(random.uniform(0, 255), random.uniform(0, 255), random.uniform(0, 255));
     cv::rectangle(picture, square, colour, cv::FILLED);
@@ -93,8 +93,8 @@ std::vector<Camera> camera_that_stands(Picture picture) {
 /// One after the other they are a walk there and back.
 std::vector<Camera> camera_that_walks(Picture picture) {
   std::vector<Camera> pictures;
-  for (int shift_px = 0; shift_px < 2 * kWalk_px; shift_px += kStep_px) {
-    pictures.emplace_back(picture, std::min(shift_px, 2 * kWalk_px - shift_px));
+  for (int shift_px = 0; shift_px < 2 * kWalk; shift_px += kStep) {
+    pictures.emplace_back(picture, std::min(shift_px, 2 * kWalk - shift_px));
   }
   return pictures;
 }
@@ -119,7 +119,7 @@ void measure(benchmark::State& state, std::vector<Camera> pictures, Use use) {
     Camera& camera = pictures[sequence % pictures.size()];
     return use(camera.frame(), sequence++);
   };
-  while (sequence < 200) {  // every buffer has held a frame once
+  for (int i = 0; i < 200; ++i) {  // every buffer has held a frame once
     (void)next();
   }
   Allocations kept;

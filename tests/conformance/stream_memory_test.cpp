@@ -22,26 +22,26 @@ constexpr milliseconds kInterval(33);
 class Walk {
  public:
   Frame frame(int index) {
-    const int x_px = std::abs(index * kStep_px % (2 * kLength_px) - kLength_px);
+    const int x_px = std::abs(index * kStep % (2 * kLength) - kLength);
     const std::size_t slot = *pool_->take();
-    const cv::Mat view = wall_(cv::Rect(x_px, 0, kWidth_px, kHeight_px));
+    const cv::Mat view = wall_(cv::Rect(x_px, 0, kWidth, kHeight));
     pool_->bytes(slot).resize(view.total());
-    view.copyTo(cv::Mat(kHeight_px, kWidth_px, CV_8UC1, pool_->bytes(slot).data()));
+    view.copyTo(cv::Mat(kHeight, kWidth, CV_8UC1, pool_->bytes(slot).data()));
     FrameInfo info;
     info.layout.format = PixelFormat::kGrey;
-    info.layout.width_px = kWidth_px;
-    info.layout.height_px = kHeight_px;
-    info.layout.stride_bytes = kWidth_px;
+    info.layout.width_px = kWidth;
+    info.layout.height_px = kHeight;
+    info.layout.stride_bytes = kWidth;
     return {info, pool_->bytes(slot), pool_, slot};
   }
 
  private:
-  static constexpr int kWidth_px = 320;
-  static constexpr int kHeight_px = 240;
-  static constexpr int kLength_px = 400;
-  static constexpr int kStep_px = 4;
+  static constexpr int kWidth = 320;
+  static constexpr int kHeight = 240;
+  static constexpr int kLength = 400;
+  static constexpr int kStep = 4;
 
-  cv::Mat wall_ = test_support::textured_image(kWidth_px + kLength_px, kHeight_px, 5);
+  cv::Mat wall_ = test_support::textured_image(kWidth + kLength, kHeight, 5);
   std::shared_ptr<SlotPool> pool_ = std::make_shared<SlotPool>(1, nullptr);
 };
 

@@ -122,7 +122,8 @@ TEST_F(KeyframeSelectorTest, KeepsOneFrameOfACameraThatStandsStill) {
 
 TEST_F(KeyframeSelectorTest, NamesRepeatedFrames) {
   for (int i = 0; i < 40; ++i) {
-    offer(view_at(6.0 * (i / 2)));
+    const int step = i / 2;
+    offer(view_at(6.0 * step));
   }
   finish();
   EXPECT_EQ(frames_with(FrameVerdict::kDuplicate).size(), 20U);
