@@ -5,6 +5,7 @@
 #include <thread>
 #include <vector>
 
+#include <Eigen/Core>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
@@ -139,22 +140,11 @@ cv::Point2d place(const Keypoint& keypoint) {
   return {static_cast<double>(keypoint.x_px), static_cast<double>(keypoint.y_px)};
 }
 
-cv::Mat descriptor_rows(const FeatureSet& features) {
-  cv::Mat rows(static_cast<int>(features.size()), 128, CV_32F);
-  std::copy(features.descriptors.begin(), features.descriptors.end(), rows.begin<float>());
-  return rows;
-}
-
-/// For each feature of `from` the index of the one in `to` with the most similar descriptor.
-std::vector<std::size_t> nearest_descriptors(const FeatureSet& from, const FeatureSet& to) {
-  const cv::Mat similarity = descriptor_rows(from) * descriptor_rows(to).t();
-  std::vector<std::size_t> nearest;
-  for (int i = 0; i < similarity.rows; ++i) {
-    cv::Point best;
-    cv::minMaxLoc(similarity.row(i), nullptr, nullptr, nullptr, &best);
-    nearest.push_back(static_cast<std::size_t>(best.x));
-  }
-  return nearest;
+/// A column for each feature.
+Eigen::MatrixXf descriptor_columns(const FeatureSet& features) {
+  using Bytes = Eigen::Matrix<std::uint8_t, 128, Eigen::Dynamic>;
+  const auto count = static_cast<Eigen::Index>(features.size());
+  return Eigen::Map<const Bytes>(features.descriptors.data(), 128, count).cast<float>();
 }
 
 /// Compares the keypoints of a 400x400 image and of its warp by the similarity `warp`. Left out are
@@ -167,7 +157,8 @@ Repeat compare(const FeatureSet& from,
   const double scale = std::hypot(warp(0, 0), warp(1, 0));
   const double turn = std::atan2(warp(1, 0), warp(0, 0));
   const cv::Rect2d inside(border, border, 400 - 2 * border, 400 - 2 * border);
-  const std::vector<std::size_t> nearest = nearest_descriptors(from, to);
+  const Eigen::MatrixXf from_columns = descriptor_columns(from);
+  const Eigen::MatrixXf to_rows = descriptor_columns(to).transpose();
   int visible = 0;
   int repeated = 0;
   std::vector<double> angle_errors;
@@ -188,7 +179,9 @@ Repeat compare(const FeatureSet& from,
       continue;
     }
     ++repeated;
-    const Keypoint& match = to.keypoints[nearest[i]];
+    std::size_t nearest = 0;
+    (to_rows * from_columns.col(static_cast<Eigen::Index>(i))).maxCoeff(&nearest);
+    const Keypoint& match = to.keypoints[nearest];
     if (is_repeat(match)) {
       const double error = static_cast<double>(match.angle_rad - a.angle_rad) - turn;
       angle_errors.push_back(std::abs(std::remainder(error, 2.0 * std::numbers::pi)));
