@@ -6,54 +6,28 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <opencv2/core.hpp>
 
 #include "drivers/camera/slot_pool.hpp"
-#include "tests/support/textured_image.hpp"
+#include "tests/support/panning_camera.hpp"
 #include "tests/unit/firmware/daemon/test_frames.hpp"
 
 namespace trigmesh {
 namespace {
 
 using std::chrono::milliseconds;
+using test_support::PanningCamera;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 using ::testing::Not;
 using ::testing::SizeIs;
 
-constexpr int kWidth = 320;
-constexpr int kHeight = 240;
 constexpr milliseconds kInterval(33);
-
-/// A camera that looks at a large picture, from `x_px` on.
-class Pan {
- public:
-  explicit Pan(int longest_px)
-      : wall_(test_support::textured_image(kWidth + longest_px, kHeight, /*seed=*/3)),
-        pool_(std::make_shared<SlotPool>(1, nullptr)) {}
-
-  [[nodiscard]] Frame at(int x_px) {
-    const std::size_t slot = *pool_->take();
-    const cv::Mat view = wall_(cv::Rect(x_px, 0, kWidth, kHeight)).clone();
-    pool_->bytes(slot).assign(view.datastart, view.dataend);
-    FrameInfo info;
-    info.layout.format = PixelFormat::kGrey;
-    info.layout.width_px = kWidth;
-    info.layout.height_px = kHeight;
-    info.layout.stride_bytes = kWidth;
-    return {info, pool_->bytes(slot), pool_, slot};
-  }
-
- private:
-  cv::Mat wall_;
-  std::shared_ptr<SlotPool> pool_;
-};
 
 class KeyframeStreamTest : public ::testing::Test {
  protected:
   /// Frames of a pan of `step_px` a frame.
   void walk(KeyframeStream& stream, int frames, int step_px) {
-    Pan pan(frames * step_px);
+    PanningCamera pan(frames * step_px);
     for (int i = 0; i < frames; ++i) {
       offer(stream,
             pan.at(i * step_px),
@@ -166,7 +140,7 @@ TEST_F(KeyframeStreamTest, ACameraThatIsFasterThanExpectedIsFollowedToo) {
 TEST_F(KeyframeStreamTest, DamagedFramesAndTimesThatDoNotRiseAreCounted) {
   KeyframeStream stream({}, copies_);
   stream.begin(milliseconds(0));
-  Pan pan(10);
+  PanningCamera pan(10);
   offer(stream, pan.at(0), test_support::at(milliseconds(50)), 0);
   offer(stream, pan.at(3), test_support::at(milliseconds(50)), 1);
   auto pool = std::make_shared<SlotPool>(1, nullptr);
