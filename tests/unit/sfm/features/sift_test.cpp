@@ -194,7 +194,7 @@ Repeat compare(const FeatureSet& from,
           median * 180.0 / std::numbers::pi};
 }
 
-TEST(Sift, FindsAndRecognisesTextureAfterTurningAndZooming) {
+TEST(SiftSlow, FindsAndRecognisesTextureAfterTurningAndZooming) {
   const cv::Mat image = texture(400, 11);
   const FeatureSet from = extract(image);
   ASSERT_GT(from.size(), 300U);
